@@ -1,6 +1,8 @@
 //! Range sensors.
 
 use crate::{InvalidMessage, Message};
+use geometry::Pose2;
+use std::f64::consts::FRAC_PI_2;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
 /// How many time-of-flight sensors the coffee robot carries (COF-020).
@@ -49,6 +51,10 @@ pub struct TofRanges {
     pub status: [RangeStatus; TOF_COUNT],
 }
 
+const fn mount(x_m: f64, y_m: f64, heading_rad: f64) -> Pose2 {
+    Pose2 { x_m, y_m, heading_rad }
+}
+
 /// One reading of a time-of-flight sensor, judged by its status (companions 2.1, X-23, X-27).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reading {
@@ -65,6 +71,22 @@ pub enum Reading {
 impl TofRanges {
     /// The smallest distance that a VL53L1X measures (COF-021); what is nearer violates every radius.
     pub const MINIMUM_M: f32 = 0.040;
+
+    /// Distance between the two sensors of a side (COF-023).
+    pub const SIDE_BASE_M: f64 = 0.277;
+
+    /// Where each sensor sits and looks in the robot's frame, whose origin is the middle of the 610 mm long and 510 mm wide body
+    /// (COF-003, COF-023, COF-025): the front sensors 115 mm apart on the front edge, the side sensors 277 mm apart on the side edges.
+    pub const MOUNTS: [Pose2; TOF_COUNT] = [
+        mount(-0.1385, -0.255, -FRAC_PI_2),
+        mount(0.1385, -0.255, -FRAC_PI_2),
+        mount(0.305, -0.1725, 0.0),
+        mount(0.305, -0.0575, 0.0),
+        mount(0.305, 0.0575, 0.0),
+        mount(0.305, 0.1725, 0.0),
+        mount(0.1385, 0.255, FRAC_PI_2),
+        mount(-0.1385, 0.255, FRAC_PI_2),
+    ];
 
     /// The reading of one sensor. Sensors that do not exist, states without a name and numbers that are no distance are faults.
     pub fn reading(&self, sensor: usize) -> Reading {
