@@ -1,1 +1,1 @@
-//! placeholder
+//! The harness for process graphs.
