@@ -35,7 +35,11 @@ fn manifest(folder: &Path) -> toml::Table {
 fn dependencies(folder: &Path) -> Vec<String> {
     let manifest = manifest(folder);
     let names = |section: &str| {
-        manifest.get(section).and_then(|value| value.as_table()).into_iter().flat_map(|table| table.keys().cloned())
+        manifest
+            .get(section)
+            .and_then(|value| value.as_table())
+            .into_iter()
+            .flat_map(|table| table.keys().cloned())
     };
     names("dependencies").chain(names("dev-dependencies")).chain(names("build-dependencies")).collect()
 }
@@ -150,7 +154,10 @@ fn glam_appears_in_geometry_only() {
 fn every_crate_obeys_the_one_lint_table() {
     let root = root();
     let mut crates = folders(&root.join("services"));
-    crates.extend(["board", "launch", "tests", "schemas/geometry", "schemas/messages", "schemas/messages/derive"].map(|name| root.join(name)));
+    crates.extend(
+        ["board", "launch", "tests", "schemas/geometry", "schemas/messages", "schemas/messages/derive"]
+            .map(|name| root.join(name)),
+    );
     for folder in crates {
         let workspace = manifest(&folder)
             .get("lints")
@@ -174,8 +181,21 @@ fn a_service_is_named_after_its_folder() {
 #[test]
 fn the_top_level_is_the_agreed_one() {
     let allowed = [
-        "Cargo.toml", "Cargo.lock", "README.md", "ARCHITECTURE.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT",
-        "board", "clippy.toml", "launch", "rustfmt.toml", "schemas", "services", "tests", "target",
+        "Cargo.toml",
+        "Cargo.lock",
+        "README.md",
+        "ARCHITECTURE.md",
+        "CHANGELOG.md",
+        "LICENSE-APACHE",
+        "LICENSE-MIT",
+        "board",
+        "clippy.toml",
+        "launch",
+        "rustfmt.toml",
+        "schemas",
+        "services",
+        "tests",
+        "target",
     ];
     for entry in fs::read_dir(root()).unwrap() {
         let name = entry.unwrap().file_name().to_string_lossy().into_owned();
