@@ -11,6 +11,7 @@ mod polygon;
 mod pose;
 mod scene;
 mod segment;
+mod sweep;
 mod walls;
 pub mod world;
 
