@@ -28,8 +28,8 @@ impl DeadReckoning {
     /// Once a period, while the encoders answer, the odometry until now.
     pub(crate) fn step(&mut self, now: Time, travel: Option<WheelTravel>) -> Option<Odometry> {
         let travel = travel?;
-        // A timer may fire a little early; a quarter of a period is no reason to skip a message.
-        let due = self.next.is_none_or(|next| now.after(self.period / 4) >= next);
+        // A timer may fire a little early; a tenth of a period is no reason to skip a message.
+        let due = self.next.is_none_or(|next| now.after(self.period / 10) >= next);
         if !due {
             return None;
         }
