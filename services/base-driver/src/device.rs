@@ -35,6 +35,9 @@ pub enum DeviceError {
 
 /// What a motor controller has to offer. The wheels' speeds reach it by [`BaseDevice::drive`], after every step.
 pub trait BaseDevice: std::fmt::Debug {
+    /// The newest truth, shown before every step. Only simulated motors look at it.
+    fn see(&mut self, _truth: Option<Stamped<'_, WorldTruth>>) {}
+
     /// What the encoders have counted.
     ///
     /// # Errors
@@ -60,17 +63,16 @@ impl SimulatedBase {
     pub fn new(deadline: Duration) -> Self {
         Self { deadline, heard: None }
     }
+}
 
-    /// The newest truth, to be shown before every step.
-    pub fn see(&mut self, truth: Option<Stamped<'_, WorldTruth>>) {
+impl BaseDevice for SimulatedBase {
+    fn see(&mut self, truth: Option<Stamped<'_, WorldTruth>>) {
         if let Some(truth) = truth {
             let travel = WheelTravel { left_m: truth.left_travel_m, right_m: truth.right_travel_m };
             self.heard = Some((truth.stamp, travel));
         }
     }
-}
 
-impl BaseDevice for SimulatedBase {
     fn travel(&mut self, now: Time) -> Result<WheelTravel, DeviceError> {
         let (stamp, travel) = self.heard.ok_or(DeviceError::NeverHeard)?;
         let silent = now.since(stamp);

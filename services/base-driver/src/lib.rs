@@ -93,11 +93,14 @@ impl BaseDriver {
     }
 
     fn decide(&mut self, now: Time, inputs: &Inputs<'_>, travel: Option<WheelTravel>) -> Decision {
-        use DriveReasonName::{DeviceFault, Driving, GuardStop, InvalidCommand, InvalidGuard, StaleCommand, StaleGuard};
+        use DriveReasonName::{
+            DeviceFault, Driving, GuardStop, InvalidCommand, InvalidGuard, StaleCommand, StaleGuard,
+        };
         let guard_deadline = Duration::from_millis(self.params.guard_deadline_ms.into());
         let command_deadline = Duration::from_millis(self.params.command_deadline_ms.into());
 
-        let clearance = inputs.clearance.filter(|word| is_fresh(now, word.stamp, guard_deadline)).ok_or(StaleGuard)?;
+        let clearance =
+            inputs.clearance.filter(|word| is_fresh(now, word.stamp, guard_deadline)).ok_or(StaleGuard)?;
         let verdict = clearance.signal.get().map_err(|_| InvalidGuard)?;
         let guard_reason = clearance.reason.get().map_err(|_| InvalidGuard)?;
         if verdict == Verdict::Go {
@@ -106,11 +109,12 @@ impl BaseDriver {
                 return Err(InvalidGuard);
             }
         }
-        let desired =
-            inputs.desired.filter(|wish| is_fresh(now, wish.stamp, command_deadline)).ok_or(match verdict {
+        let desired = inputs.desired.filter(|wish| is_fresh(now, wish.stamp, command_deadline)).ok_or(
+            match verdict {
                 Verdict::Go => StaleCommand,
                 Verdict::Stop => GuardStop,
-            })?;
+            },
+        )?;
         let travel = travel.ok_or(DeviceFault)?;
         if verdict == Verdict::Stop {
             return self.escape(&clearance, guard_reason, *desired.message, travel).ok_or(GuardStop);

@@ -1,5 +1,6 @@
 //! The parameters of the base driver.
 
+use crate::{BaseDevice, SimulatedBase};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -85,7 +86,9 @@ pub enum ParamsError {
         max: f64,
     },
     /// The driver would sleep through a deadline.
-    #[error("{name} = {deadline_ms} is shorter than period_ms = {period_ms}; lengthen the deadline or shorten the period")]
+    #[error(
+        "{name} = {deadline_ms} is shorter than period_ms = {period_ms}; lengthen the deadline or shorten the period"
+    )]
     DeadlineBelowPeriod {
         /// The deadline.
         name: &'static str,
@@ -105,6 +108,15 @@ pub enum ParamsError {
 }
 
 impl Params {
+    /// The motor controller that they name.
+    pub fn open_device(&self) -> Box<dyn BaseDevice> {
+        match self.device {
+            Device::Simulated => {
+                Box::new(SimulatedBase::new(Duration::from_millis(self.device_deadline_ms.into())))
+            }
+        }
+    }
+
     /// Between two steps without a message.
     pub fn period(&self) -> Duration {
         Duration::from_millis(self.period_ms.into())
@@ -124,7 +136,11 @@ impl messages::Parameters for Params {
         for (name, deadline_ms) in deadlines {
             within(name, deadline_ms.into(), 10.0, 1000.0)?;
             if deadline_ms < self.period_ms {
-                return Err(ParamsError::DeadlineBelowPeriod { name, deadline_ms, period_ms: self.period_ms });
+                return Err(ParamsError::DeadlineBelowPeriod {
+                    name,
+                    deadline_ms,
+                    period_ms: self.period_ms,
+                });
             }
         }
         within("max_wheel_speed_mps", self.max_wheel_speed_mps, 0.05, 3.0)?;
@@ -141,9 +157,5 @@ impl messages::Parameters for Params {
 }
 
 fn within(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), ParamsError> {
-    if (min..=max).contains(&value) {
-        Ok(())
-    } else {
-        Err(ParamsError::OutOfRange { name, value, min, max })
-    }
+    if (min..=max).contains(&value) { Ok(()) } else { Err(ParamsError::OutOfRange { name, value, min, max }) }
 }

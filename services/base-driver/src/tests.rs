@@ -54,7 +54,9 @@ fn check(word: Clearance, word_age_ms: i64, wished: (f64, f64), wish_age_ms: i64
 
 #[test]
 fn truth_table() {
-    use DriveReasonName::{Driving, Escaping, GuardStop, InvalidCommand, InvalidGuard, StaleCommand, StaleGuard};
+    use DriveReasonName::{
+        Driving, Escaping, GuardStop, InvalidCommand, InvalidGuard, StaleCommand, StaleGuard,
+    };
     let front = Face::Front as u32;
     check(go(), 0, (0.3, 0.3), 0, Driving);
     check(go(), 100, (0.3, 0.3), 100, Driving);
@@ -92,7 +94,13 @@ fn truth_table() {
     let blind = Clearance { reason: GuardReasonName::SensorFault.into(), ..stop(front) };
     check(blind, 0, (-0.1, -0.1), 0, GuardStop);
     check(Clearance { reason: GuardReasonName::Stale.into(), ..stop(front) }, 0, (-0.1, -0.1), 0, GuardStop);
-    check(Clearance { reason: GuardReasonName::Remembered.into(), ..stop(front) }, 0, (-0.1, -0.1), 0, Escaping);
+    check(
+        Clearance { reason: GuardReasonName::Remembered.into(), ..stop(front) },
+        0,
+        (-0.1, -0.1),
+        0,
+        Escaping,
+    );
     check(Clearance::default(), 0, (0.3, 0.3), 0, GuardStop);
 }
 
@@ -101,7 +109,10 @@ fn begins_at_rest_and_stays_there_without_inputs() {
     let mut driver = BaseDriver::new(Params::default()).unwrap();
     assert_eq!(driver.applied, AppliedWheels::default());
     let applied = driver.step(at(1), Inputs::default()).applied;
-    assert_eq!(applied, AppliedWheels { reason: DriveReasonName::StaleGuard.into(), ..AppliedWheels::default() });
+    assert_eq!(
+        applied,
+        AppliedWheels { reason: DriveReasonName::StaleGuard.into(), ..AppliedWheels::default() }
+    );
 }
 
 #[test]
@@ -230,8 +241,8 @@ fn check_arc(left_mps: f64, right_mps: f64, seconds: f64) {
         let travel = Some(WheelTravel { left_m: 7.0 + left_mps * t, right_m: -3.0 + right_mps * t });
         last = driver.step(at(step * STEP_MS), Inputs { travel, ..Inputs::default() }).odometry.expect("due");
     }
-    let expected =
-        Pose2::IDENTITY.after_arc(0.5 * (left_mps + right_mps) * seconds, (right_mps - left_mps) / 0.40 * seconds);
+    let expected = Pose2::IDENTITY
+        .after_arc(0.5 * (left_mps + right_mps) * seconds, (right_mps - left_mps) / 0.40 * seconds);
     let pose = last.pose().unwrap();
     assert!(pose.distance_m(expected) < 1e-9, "{pose:?} instead of {expected:?}");
     assert!(geometry::angle::difference(pose.heading_rad, expected.heading_rad).abs() < 1e-9);
@@ -267,7 +278,8 @@ fn odometry_comes_at_fifty_hertz_whatever_the_steps() {
     let mut driver = BaseDriver::new(Params::default()).unwrap();
     let travel = Some(WheelTravel::default());
     // The last of them may come a little early.
-    let count = (0..990).filter(|&ms| driver.step(at(ms), Inputs { travel, ..Inputs::default() }).odometry.is_some());
+    let count =
+        (0..990).filter(|&ms| driver.step(at(ms), Inputs { travel, ..Inputs::default() }).odometry.is_some());
     assert_eq!(count.count(), 50);
 }
 
@@ -284,7 +296,10 @@ fn refuses_nonsense_with_names_and_values() {
     refuse(Params { command_deadline_ms: 19, ..Params::default() }, "command_deadline_ms = 19");
     refuse(Params { max_wheel_speed_mps: f64::NAN, ..Params::default() }, "max_wheel_speed_mps = NaN");
     refuse(Params { wheel_track_m: 0.0, ..Params::default() }, "wheel_track_m = 0");
-    refuse(Params { escape_speed_mps: 0.2, max_wheel_speed_mps: 0.1, ..Params::default() }, "lower the first");
+    refuse(
+        Params { escape_speed_mps: 0.2, max_wheel_speed_mps: 0.1, ..Params::default() },
+        "lower the first",
+    );
 }
 
 #[test]
