@@ -102,7 +102,7 @@ impl Anchors {
             }
             let silent = self.messages - anchor.heard >= u64::from(silent_messages);
             let near = from.is_none_or(|[x_m, y_m]| {
-                (anchor.at_m[0] - x_m).hypot(anchor.at_m[1] - y_m) <= 0.8 * anchor.farthest_m
+                (anchor.at_m[0] - x_m).hypot(anchor.at_m[1] - y_m) <= anchor.farthest_m
             });
             if anchor.always_wrong || (silent && near && self.last_heard < USED_AT_ONCE) {
                 bits.dead |= 1 << slot;

@@ -13,10 +13,18 @@ const PRUNE: f64 = 12.0;
 /// Hypotheses closer than this squared Mahalanobis distance, by their covariances' sum, become one.
 const MERGE: f64 = 0.3;
 
+/// Readings taken at one place share their errors, so they cannot vote again and again on which hypothesis is right. A path or a turn
+/// this long makes them independent; without any motion they count this share.
+const INDEPENDENT_M: f64 = 0.3;
+const INDEPENDENT_RAD: f64 = 0.6;
+const LEAST_NEWS: f64 = 0.1;
+
 /// The mixture. Held in a vector whose capacity is reserved once.
 #[derive(Debug, Clone)]
 pub(crate) struct Bank {
     held: Vec<Hypothesis>,
+    /// How much the next measurements may say about which hypothesis is right, from 0 to 1.
+    news: f64,
 }
 
 /// What the mixture amounts to.
@@ -41,7 +49,7 @@ impl Estimate {
 
 impl Bank {
     pub(crate) fn new() -> Self {
-        Self { held: Vec::with_capacity(CAPACITY) }
+        Self { held: Vec::with_capacity(CAPACITY), news: LEAST_NEWS }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -78,9 +86,16 @@ impl Bank {
     }
 
     pub(crate) fn advance(&mut self, motion: Pose2, noise: MotionNoise) {
+        let news = motion.x_m.hypot(motion.y_m) / INDEPENDENT_M + motion.heading_rad.abs() / INDEPENDENT_RAD;
+        self.news = (self.news + news).min(1.0);
         for hypothesis in &mut self.held {
             hypothesis.advance(motion, noise);
         }
+    }
+
+    /// The readings of this moment have had their say.
+    pub(crate) fn grow_stale(&mut self) {
+        self.news = LEAST_NEWS;
     }
 
     pub(crate) fn blur(&mut self, sigma_m: f64, sigma_rad: f64) {
@@ -97,7 +112,7 @@ impl Bank {
         for (index, hypothesis) in self.held.iter_mut().enumerate() {
             let wrong = f64::from(hypothesis.wrong[reading.slot]);
             let prior = (1.0 - wrong) * (1.0 - outlier) + wrong * recovery;
-            let share = hypothesis.correct(&hypothesis.compare_range(&RangeReading { prior, ..*reading }));
+            let share = hypothesis.correct(&hypothesis.compare_range(&RangeReading { prior, ..*reading }), self.news);
             hypothesis.wrong[reading.slot] = (1.0 - share) as f32;
             if index == best {
                 verdict = share;
@@ -118,12 +133,12 @@ impl Bank {
         for (index, hypothesis) in self.held.iter_mut().enumerate() {
             match compare(hypothesis) {
                 Some(comparison) => {
-                    let share = hypothesis.correct(&comparison);
+                    let share = hypothesis.correct(&comparison, self.news);
                     if index == best {
                         verdict = Some(share);
                     }
                 }
-                None => hypothesis.log_weight += wrong_density.ln(),
+                None => hypothesis.log_weight += self.news * wrong_density.ln(),
             }
         }
         verdict

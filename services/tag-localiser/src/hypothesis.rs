@@ -74,8 +74,9 @@ impl Hypothesis {
     }
 
     /// Probabilistic data association with one measurement that is either good or from anywhere (Bar-Shalom, Willett and Tian 2011,
-    /// section 3.4): the correction counts as much as the measurement is probably good. Returns that probability.
-    pub(crate) fn correct(&mut self, seen: &Comparison) -> f64 {
+    /// section 3.4): the correction counts as much as the measurement is probably good. Returns that probability. The weight changes
+    /// by the measurement's likelihood to the power of `news`.
+    pub(crate) fn correct(&mut self, seen: &Comparison, news: f64) -> f64 {
         let spread = self.covariance * seen.jacobian.transpose();
         let variance = (seen.jacobian * spread)[0] + seen.variance;
         let good = seen.prior * (-0.5 * seen.innovation * seen.innovation / variance).exp()
@@ -85,7 +86,7 @@ impl Hypothesis {
             return 0.0;
         }
         let share = good / total;
-        self.log_weight += total.ln();
+        self.log_weight += news * total.ln();
         let gain = spread / variance;
         let shift = gain * (share * seen.innovation);
         self.pose = Pose2::new(

@@ -54,7 +54,7 @@ const KNOWN_SIGMA_M: f64 = 0.7;
 const KNOWN_SIGMA_RAD: f64 = 0.5;
 /// From this share of rejected readings on, averaged over about ten, the estimate is degraded.
 const MANY_REJECTED: f64 = 0.3;
-/// From this share of side readings on that contradict the walls, averaged over about thirty, the estimate is degraded.
+/// From this share of side readings on that contradict the walls, though they agree with each other, averaged over about ten frames, the estimate is degraded.
 const SIDES_DISAGREE: f64 = 0.8;
 /// A heading correction is never believed better than this: a wall is drawn, and measured from half a metre away.
 const HEADING_SIGMA_RAD: f64 = 0.02;
@@ -198,6 +198,7 @@ impl TagLocaliser {
             explained += usize::from(good);
             if good { self.accept() } else { self.reject(1) }
         }
+        self.bank.grow_stale();
         self.bank.tidy();
         self.try_elsewhere(readings, explained, antenna_of(tag));
     }
@@ -389,13 +390,20 @@ impl TagLocaliser {
             return;
         }
         let (walls, sigma_m) = (&self.walls, self.params.side_sigma_m);
-        for sensor in walls::SIDE_SENSORS {
+        let Some(agreeing) = self.bank.best().map(|best| walls.agreeing(best, floor, ranges, sigma_m)) else { return };
+        let (mut seen, mut fitting) = (0.0, 0.0);
+        for sensor in walls::SIDE_SENSORS.into_iter().filter(|sensor| agreeing.contains(*sensor)) {
             let verdict = self.bank.observe(HallwayWalls::WRONG_DENSITY, |one| {
-                walls.compare(one, floor, sensor, ranges, sigma_m)
+                let mut comparison = walls.compare(one, floor, sensor, ranges, sigma_m)?;
+                comparison.variance *= agreeing.caution;
+                Some(comparison)
             });
             if let Some(share) = verdict {
-                self.disagreeing_sides += 0.03 * (1.0 - share - self.disagreeing_sides);
+                (seen, fitting) = (seen + 1.0, fitting + share);
             }
+        }
+        if seen > 0.0 {
+            self.disagreeing_sides += 0.1 * (1.0 - fitting / seen - self.disagreeing_sides);
         }
         self.bank.tidy();
     }

@@ -23,6 +23,20 @@ pub struct HallwayWalls {
     openings: Vec<(i32, Segment)>,
 }
 
+/// The sides whose readings can be used, and by how much their variance grows.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Agreeing {
+    right: bool,
+    left: bool,
+    pub(crate) caution: f64,
+}
+
+impl Agreeing {
+    pub(crate) fn contains(&self, sensor: usize) -> bool {
+        if sensor < 2 { self.right } else { self.left }
+    }
+}
+
 impl HallwayWalls {
     /// The walls of a world, before doors are cut, and its doors.
     pub fn of(world: &World) -> Self {
@@ -41,6 +55,33 @@ impl HallwayWalls {
 
     pub(crate) fn is_empty(&self) -> bool {
         self.walls.is_empty()
+    }
+
+    /// Which side sensors see walls and nothing else, as far as they can tell among themselves: the two of a side must see one
+    /// straight wall, and right and left together must measure the hallway's width, whatever the robot's place in it. A door that
+    /// no drawing shows, or a person, breaks one of the two.
+    pub(crate) fn agreeing(
+        &self,
+        best: &Hypothesis,
+        floor: i32,
+        ranges: &TofRanges,
+        sigma_m: f64,
+    ) -> Agreeing {
+        let error = |sensor| self.compare(best, floor, sensor, ranges, sigma_m).map(|one| one.innovation);
+        let turn_m = TofRanges::SIDE_BASE_M * best.covariance[(2, 2)].max(0.0).sqrt();
+        let straight_m = 2.0 * (2.0 * sigma_m * sigma_m + turn_m * turn_m).sqrt();
+        let side = |first, second| {
+            let (a, b) = (error(first)?, error(second)?);
+            ((a - b).abs() < straight_m).then_some(0.5 * (a + b))
+        };
+        match (side(0, 1), side(6, 7)) {
+            (Some(right), Some(left)) if (right + left).abs() < 2.0 * sigma_m => {
+                Agreeing { right: true, left: true, caution: 1.0 }
+            }
+            (Some(_), Some(_)) | (None, None) => Agreeing::default(),
+            // One side alone has nothing to be measured against: half as good.
+            (right, left) => Agreeing { right: right.is_some(), left: left.is_some(), caution: 4.0 },
+        }
     }
 
     /// The reading of one side sensor against the wall that a hypothesis expects there; `None` when there is no wall to speak of.
