@@ -8,15 +8,15 @@ use nalgebra::Matrix3;
 pub(crate) const CAPACITY: usize = 96;
 /// How many headings are tried at a place: 30 degrees apart.
 pub(crate) const HEADINGS: usize = 12;
-/// Hypotheses e^-12 times as likely as the best are dropped.
-const PRUNE: f64 = 12.0;
+/// Hypotheses e^-14 times as likely as the best are dropped.
+const PRUNE: f64 = 14.0;
 /// Hypotheses closer than this squared Mahalanobis distance, by their covariances' sum, become one.
 const MERGE: f64 = 0.3;
 
 /// Readings taken at one place share their errors, so they cannot vote again and again on which hypothesis is right. A path or a turn
 /// this long makes them independent; without any motion they count this share.
-const INDEPENDENT_M: f64 = 0.3;
-const INDEPENDENT_RAD: f64 = 0.6;
+const INDEPENDENT_M: f64 = 1.0;
+const INDEPENDENT_RAD: f64 = 2.0;
 const LEAST_NEWS: f64 = 0.1;
 
 /// The mixture. Held in a vector whose capacity is reserved once.

@@ -23,13 +23,13 @@ use bank::{Bank, Estimate, HEADINGS};
 use geometry::{Pose2, angle};
 use hypothesis::{Comparison, Hypothesis, MotionNoise, RangeReading};
 use messages::{
-    ANCHOR_CAPACITY, HeadingCorrection, LocationStateName, Odometry, Parameters, PoseEstimate, Stamped,
+    ANCHOR_CAPACITY, HeadingCorrection, LocationStateName, Message, Odometry, Parameters, PoseEstimate, Stamped,
     TagRanges, Time, TofRanges,
 };
 use nalgebra::RowVector3;
 use places::{PLACE_LIMIT, Places};
 
-/// What a step sees. A message seen before is recognised by its stamp and not used again, odometry excepted, which is a state.
+/// What a step sees. A message seen before is recognised by its stamp and count, and not used again, odometry excepted, which is a state.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Inputs<'a> {
     /// Dead reckoning; its increments are used.
@@ -85,18 +85,17 @@ pub struct TagLocaliser {
     known: bool,
 }
 
-/// The stamps of the messages used last.
+/// The stamps, and publisher's counts, of the messages used last.
 #[derive(Debug, Clone, Copy, Default)]
 struct Seen {
-    tag: Option<Time>,
+    tag: Option<(Time, u64)>,
     ranges: Option<Time>,
-    heading: Option<Time>,
+    heading: Option<(Time, u64)>,
 }
 
-fn is_new(last: &mut Option<Time>, stamp: Time) -> bool {
-    let new = *last != Some(stamp);
-    *last = Some(stamp);
-    new
+fn is_new<T: Message>(last: &mut Option<(Time, u64)>, message: &Stamped<'_, T>) -> bool {
+    let this = Some((message.stamp, message.sequence));
+    std::mem::replace(last, this) != this
 }
 
 impl TagLocaliser {
@@ -135,12 +134,12 @@ impl TagLocaliser {
             self.advance(&odometry);
         }
         if let Some(tag) = inputs.tag
-            && is_new(&mut self.seen.tag, tag.stamp)
+            && is_new(&mut self.seen.tag, &tag)
         {
             self.hear(&tag);
         }
         if let Some(heading) = inputs.heading
-            && is_new(&mut self.seen.heading, heading.stamp)
+            && is_new(&mut self.seen.heading, &heading)
         {
             self.turn_to_wall(&heading);
         }
@@ -329,7 +328,9 @@ impl TagLocaliser {
     /// When the readings contradict the belief for long, and agree among each other on another place, that place is tried beside it.
     fn try_elsewhere(&mut self, readings: &[RangeReading], explained: usize, antenna_m: [f64; 2]) {
         let contradicted = 2 * explained < readings.len().max(1) + 1 && explained < 3;
-        self.unexplained = if contradicted { self.unexplained + 1 } else { 0 };
+        // Nothing explained at all weighs double.
+        let weight = if explained == 0 && readings.len() > 1 { 2 } else { 1 };
+        self.unexplained = if contradicted { self.unexplained + weight } else { 0 };
         if self.unexplained < self.params.recovery_messages {
             return;
         }
@@ -425,7 +426,7 @@ impl TagLocaliser {
         let silent = self
             .seen
             .tag
-            .is_none_or(|stamp| now.seconds_since(stamp) > self.params.tag_timeout_s);
+            .is_none_or(|(stamp, _)| now.seconds_since(stamp) > self.params.tag_timeout_s);
         let mut bits = self.anchors.bits(floor, place, self.params.silent_messages);
         if silent {
             bits = AnchorBits { alive: 0, dead: bits.alive | bits.dead };
