@@ -1,1 +1,50 @@
-//! placeholder
+//! The messages of Corkboard: plain bytes with units, frames and limits, which describe themselves.
+//!
+//! A message is a `#[repr(C)]` struct without padding in which every bit pattern is valid (`zerocopy` proves both at compile
+//! time), so a message from a broken or hostile process may be nonsense and is never undefined behaviour. One declaration gives
+//! the type, its fingerprint, its JSON and its schema for recordings.
+
+// The derive writes `::messages::..`, also for the messages of this very crate.
+extern crate self as messages;
+
+mod json;
+mod kind;
+mod message;
+mod params;
+mod text;
+mod time;
+
+mod coffee;
+mod drive;
+mod elevator;
+mod health;
+mod location;
+mod plan;
+mod range;
+mod safety;
+mod summary;
+mod world;
+
+#[cfg(test)]
+mod tests;
+
+pub use coffee::*;
+pub use drive::*;
+pub use elevator::*;
+pub use health::*;
+pub use json::JsonError;
+pub use kind::{Description, Field, FieldDescription, Kind, unit_of};
+pub use location::*;
+pub use message::{Element, InvalidMessage, Message, NoElement, Stamped, View, elements_offset};
+pub use messages_derive::Message;
+pub use params::Parameters;
+pub use plan::*;
+pub use range::*;
+pub use safety::*;
+pub use summary::*;
+pub use text::{FixedText, TextTooLong};
+pub use time::Time;
+pub use world::*;
+
+#[doc(hidden)]
+pub use zerocopy as __zerocopy;
