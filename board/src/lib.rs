@@ -1,1 +1,3 @@
-//! placeholder
+//! The message board.
+mod interface;
+pub use interface::{About, Direction, Interface, PortDescription};
