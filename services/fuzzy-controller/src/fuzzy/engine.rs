@@ -19,8 +19,8 @@ pub struct Options {
 /// How the area under an accumulated conclusion is integrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Integration {
-    /// In closed form where terms are made of straight lines, by adaptive quadrature to 1e-10 where the centroid of curves
-    /// is asked for. (Bisector and maxima of curves: 1000 samples.)
+    /// In closed form where terms are made of straight lines, by adaptive quadrature (to about 1e-10) where the centroid of
+    /// curves is asked for. (Bisector and maxima of curves: 1000 samples.)
     #[default]
     Exact,
     /// Over this many samples, each in the middle of its step.
@@ -137,7 +137,7 @@ impl Engine {
                 }
                 named.term.check().map_err(|source| EngineError::Term { variable, term, source })?;
             }
-            if input.range.is_some_and(|(low, high)| !(low < high)) {
+            if input.range.is_some_and(|(low, high)| low >= high || low.is_nan() || high.is_nan()) {
                 return Err(EngineError::Range { variable: input.name.clone() });
             }
         }
@@ -192,7 +192,7 @@ impl Engine {
         self.premises.membership(input, term)
     }
 
-    /// How an output is defuzzified: `levels` and `walk` are exact, `quadrature` is exact to 1e-10, `sampled`, `weighted`.
+    /// How an output is defuzzified: `levels` and `walk` are exact, `quadrature` is exact to about 1e-10, `sampled`, `weighted`.
     pub fn kernel(&self, output: usize) -> Option<&'static str> {
         self.outputs.get(output).map(OutputPlan::kernel)
     }

@@ -13,6 +13,8 @@ mod quadrature;
 mod sampled;
 mod system;
 mod terms;
+#[cfg(test)]
+mod tests;
 mod walk;
 
 pub use engine::{Engine, EngineError, Integration, Options};

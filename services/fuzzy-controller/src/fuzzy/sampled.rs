@@ -106,7 +106,7 @@ impl Sampled {
             .map(|(x, _)| *x);
         match method {
             Method::Leftmost => tops.next(),
-            Method::Rightmost => tops.last(),
+            Method::Rightmost => tops.next_back(),
             _ => {
                 let (count, sum) = tops.fold((0.0, 0.0), |(count, sum), x| (count + 1.0, sum + x));
                 Some(sum / count)

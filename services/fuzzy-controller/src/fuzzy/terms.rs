@@ -159,7 +159,7 @@ impl Term {
             Self::Binary([start, direction]) if !direction.is_nan() => finite(&[*start])?,
             other => finite(&other.numbers())?,
         }
-        match widths.iter().find(|width| !(**width > 0.0)) {
+        match widths.iter().find(|width| **width <= 0.0) {
             Some(width) => Err(TermError::Width(*width)),
             None => Ok(()),
         }

@@ -299,7 +299,7 @@ impl Parser {
         let low = self.number()?;
         self.symbol("..")?;
         let high = self.number()?;
-        if !(low < high) {
+        if low >= high || low.is_nan() || high.is_nan() {
             self.next = start;
             return Err(self.error(FclErrorKind::Range(low, high)));
         }
