@@ -1,7 +1,7 @@
 //! `launch up`: from a checked graph to a running robot, and back to an empty machine.
 
 use crate::control::{self, Answer, Request};
-use crate::graph::check::Checked;
+use crate::graph::Checked;
 use crate::monitor::Monitor;
 use crate::summary;
 use crate::supervise::Supervisor;
