@@ -153,6 +153,18 @@ pub(crate) struct UpArgs {
     /// Neither a live view nor lines; only what goes wrong
     #[arg(long, conflicts_with = "plain")]
     pub(crate) no_view: bool,
+    /// Run in logical time: as fast as possible, identical in every run with one seed
+    #[arg(long)]
+    pub(crate) lockstep: bool,
+    /// In lockstep: logical seconds a second, instead of as fast as possible
+    #[arg(long, value_name = "X", requires = "lockstep", value_parser = positive)]
+    pub(crate) speed: Option<f64>,
+    /// In lockstep: end after so many logical seconds
+    #[arg(long, value_name = "SECONDS", requires = "lockstep", value_parser = positive)]
+    pub(crate) until: Option<f64>,
+    /// In lockstep: the processor for the whole graph
+    #[arg(long, value_name = "N", requires = "lockstep")]
+    pub(crate) cpu: Option<usize>,
     /// Print the referee's figures as JSON at the end
     #[arg(long)]
     pub(crate) json: bool,
@@ -234,6 +246,14 @@ pub(crate) struct OrderArgs {
     /// The board.
     #[command(flatten)]
     pub(crate) running: Running,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+        Ok(number) => Err(format!("{number} is not above zero")),
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 /// Prints the completions of the command line.

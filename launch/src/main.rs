@@ -6,7 +6,9 @@ mod conductor;
 mod control;
 mod detach;
 mod graph;
+mod lockstep;
 mod monitor;
+mod observer;
 mod plain;
 mod summary;
 mod supervise;
@@ -47,5 +49,9 @@ fn up_command(args: &UpArgs) -> ExitCode {
     let options =
         up::Options { board: args.board.clone(), logs: args.log_dir.clone(), json: args.json };
     let mut display = plain::Lines::new(args.no_view);
+    if args.lockstep {
+        let pace = lockstep::Pace { speed: args.speed, until_s: args.until, cpu: args.cpu };
+        return lockstep::up(&graph, &options, &pace, &mut display);
+    }
     up::up(&graph, &options, &mut display)
 }
