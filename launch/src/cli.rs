@@ -59,6 +59,12 @@ pub(crate) enum Command {
         /// The shell
         shell: clap_complete::Shell,
     },
+    /// Clean up after services that died; the launcher calls this by itself
+    #[command(hide = true)]
+    CleanDead {
+        /// The board
+        board: String,
+    },
 }
 
 const UP_HELP: &str = "\
@@ -147,6 +153,9 @@ pub(crate) struct UpArgs {
     /// Neither a live view nor lines; only what goes wrong
     #[arg(long, conflicts_with = "plain")]
     pub(crate) no_view: bool,
+    /// Print the referee's figures as JSON at the end
+    #[arg(long)]
+    pub(crate) json: bool,
     /// Where the logs of the services go
     #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
     pub(crate) log_dir: Option<PathBuf>,

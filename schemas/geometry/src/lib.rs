@@ -3,7 +3,32 @@
 //! Frames: x forward, y left, z up; angles counter-clockwise; maps are right-handed. Units: metres and radians.
 
 pub mod angle;
+mod body;
+mod cone;
+mod grid;
+mod map_file;
+mod polygon;
 mod pose;
+mod scene;
+mod segment;
+mod sweep;
+mod walls;
+pub mod world;
 
+pub use body::{Body, BodyKind, Prism};
+pub use cone::Cone;
+pub use grid::{
+    Cell, CellsAlong, CellsBetween, Grid, GridError, GridFrame, MOST_CELLS, Occupancy, OccupancyGrid,
+    log_odds, probability,
+};
+pub use map_file::{MapError, MapHeader, MapImage, MapMode, MapProblem};
 pub use nalgebra::{Point2, Vector2};
+pub use polygon::{Polygon, PolygonError, Shape, is_simple};
 pub use pose::Pose2;
+pub use scene::{BodyId, Clearance, Hit, Ray, Scene, Surface};
+pub use segment::Segment;
+pub use walls::{WallHit, Walls};
+pub use world::{World, WorldError, WorldProblem, WorldScene};
+
+#[cfg(test)]
+mod tests;
