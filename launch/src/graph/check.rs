@@ -325,10 +325,13 @@ fn ask_with_parameters(
     match binaries.interface(&member.binary, Some(&parameters)) {
         Ok(interface) => Ok(Some(interface)),
         Err(QueryError::Refused(why)) => {
-            // The sentence names the parameters; point at the first one that the graph gives.
+            // The sentence names the parameters; point at the one it names first, of those that were given.
             let words: Vec<&str> =
                 why.split(|letter: char| !letter.is_alphanumeric() && letter != '_').collect();
-            let named = member.given.iter().find(|entry| words.contains(&entry.key.as_str()));
+            let position =
+                |entry: &&Entry| words.iter().position(|word| *word == entry.key).unwrap_or(usize::MAX);
+            let named = member.given.iter().filter(|entry| words.contains(&entry.key.as_str()));
+            let named = named.min_by_key(position);
             let place = named.map_or(&member.service.place, |entry| &entry.key_place);
             let message = format!("`{role}` refuses its parameters: {why}");
             let given = quoted(member.given.iter().map(|entry| entry.key.as_str()));

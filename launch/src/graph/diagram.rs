@@ -80,10 +80,10 @@ pub(crate) fn dot(graph: &Checked) -> String {
 }
 
 fn label(service: &CheckedService, line_break: &str) -> String {
-    if service.run == service.role {
+    let binary = service.run.rsplit('/').next().unwrap_or_default();
+    if binary == service.role {
         return service.role.clone();
     }
-    let binary = service.run.rsplit('/').next().unwrap_or_default();
     format!("{}{line_break}({})", service.role, binary.replace(['"', '\\'], "'"))
 }
 

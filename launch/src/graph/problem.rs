@@ -65,16 +65,6 @@ impl Problem {
         self
     }
 
-    /// The first line, without colours: place, severity, message.
-    pub(crate) fn headline(&self) -> String {
-        let place = self.place.as_ref().map(|place| format!("{place}: ")).unwrap_or_default();
-        let word = match self.severity {
-            Severity::Error => "error",
-            Severity::Note => "note",
-        };
-        format!("{place}{word}: {}", self.message)
-    }
-
     /// All of it for a person: headline, source line, caret, what to do.
     pub(crate) fn render(&self, palette: &Palette) -> String {
         let word = match self.severity {

@@ -1,6 +1,6 @@
 //! Who publishes, who reads, and whether they speak of the same thing.
 
-use super::check::{CheckedService, CheckedTopic, Publisher, Reader};
+use super::check::{CheckedTopic, Publisher, Reader};
 use super::problem::{Problem, Problems};
 use super::settings::{Graph, ServiceTable};
 use super::source::Place;
@@ -237,12 +237,4 @@ fn checked(graph: &Graph, topic: &str, ports: &Ports<'_>) -> Option<CheckedTopic
         fingerprint: first.description.fingerprint.clone(),
         depth: depths.max().unwrap_or(1).max(1),
     })
-}
-
-/// The topics of a checked graph with which a service has to do.
-pub(crate) fn topics_of<'a>(
-    service: &'a CheckedService,
-    topics: &'a [CheckedTopic],
-) -> impl Iterator<Item = &'a CheckedTopic> {
-    topics.iter().filter(|topic| service.interface.ports.iter().any(|port| port.topic == topic.name))
 }

@@ -129,7 +129,7 @@ impl Node {
 pub(crate) fn parse(source: &Arc<Source>, problems: &mut Problems) -> Option<Table> {
     let (table, errors) = DeTable::parse_recoverable(&source.text);
     for error in &errors {
-        problems.push(syntax_problem(source, table.get_ref(), error));
+        problems.push(syntax_problem(source, error));
     }
     let table = convert_table(source, table.get_ref(), problems);
     errors.is_empty().then_some(table)
@@ -146,22 +146,25 @@ pub(crate) fn parse_value(source: &Arc<Source>, offset: usize, problems: &mut Pr
     Node { content, place }
 }
 
-fn syntax_problem(source: &Arc<Source>, table: &DeTable<'_>, error: &toml::de::Error) -> Problem {
+fn syntax_problem(source: &Arc<Source>, error: &toml::de::Error) -> Problem {
     let place = error.span().map_or_else(|| Place::top(source), |span| Place::new(source, span));
     let name = place.text().trim().trim_matches(['[', ']', '"']);
     if error.message() == "duplicate key" && !name.is_empty() {
-        let first = table.iter().find(|(key, _)| key.get_ref() == name);
-        let twice = if first.is_some() { format!("[{name}]") } else { format!("`{name}`") };
-        let help = if first.is_some() {
-            format!(
-                "a service has one table; for a second `{name}` choose another name and add `run = \"{name}\"`"
-            )
-        } else {
-            "keep one of the two".to_owned()
-        };
-        let problem = Problem::error(&place, format!("{twice} appears twice in this file"), help);
-        return match first {
-            Some((key, _)) => problem.see(&Place::new(source, key.span()), "first here"),
+        let header = format!("[{name}]");
+        let before = source.text.get(..place.start()).unwrap_or_default();
+        if !before.ends_with('[') {
+            return Problem::error(
+                &place,
+                format!("`{name}` appears twice in this table"),
+                "keep one of the two",
+            );
+        }
+        let help = format!(
+            "a service has one table; for a second `{name}` choose another name and add `run = \"{name}\"`"
+        );
+        let problem = Problem::error(&place, format!("{header} appears twice in this file"), help);
+        return match before.find(&header) {
+            Some(start) => problem.see(&Place::new(source, start + 1..start + 1 + name.len()), "first here"),
             None => problem,
         };
     }
