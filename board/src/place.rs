@@ -37,10 +37,11 @@ impl Place {
         let user = rustix::process::getuid().as_raw();
         let root = boards_folder().join(name);
         // Names in shared memory carry the prefix alone, so it stands for user and name; no other file begins like it.
+        // Eight digits, because the transport takes 60 bytes for folder and prefix together.
         let hash = format!("{user}/{name}")
             .bytes()
-            .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
-        Ok(Self { name: name.to_owned(), root, prefix: format!("cb{hash:016x}_") })
+            .fold(0x811c_9dc5_u32, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193));
+        Ok(Self { name: name.to_owned(), root, prefix: format!("c{hash:08x}_") })
     }
 
     /// The board's name.

@@ -167,11 +167,17 @@ impl Switchboard {
     pub fn open(path: &Path) -> io::Result<Self> {
         let file = OpenOptions::new().read(true).write(true).open(path)?;
         if file.metadata()?.len() != size_of::<Page>() as u64 {
-            return Err(io::Error::new(io::ErrorKind::InvalidData, "the board was made by another version of Corkboard"));
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "the board was made by another version of Corkboard",
+            ));
         }
         let board = Self::map(&file)?;
         if board.page().header.magic.load(Ordering::Acquire) != MAGIC {
-            return Err(io::Error::new(io::ErrorKind::InvalidData, "the board was made by another version of Corkboard"));
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidData,
+                "the board was made by another version of Corkboard",
+            ));
         }
         Ok(board)
     }

@@ -1,1 +1,20 @@
-//! placeholder
+//! The harness for process graphs: start a graph on a board of its own, talk to it, wait for what it does, kill its services, and leave nothing
+//! behind.
+//!
+//! ```no_run
+//! use tests::Graph;
+//! use std::time::Duration;
+//!
+//! let graph = Graph::load("coffee").set("navigator.default_order", "").start();
+//! graph.publish("mission/orders", serde_json::json!({"room": "205"}));
+//! let status = graph.wait_for("mission/status", |status| status["room"] == "205", Duration::from_secs(5));
+//! assert_eq!(status["waiting"], 0);
+//! ```
+
+mod binaries;
+mod graph;
+mod running;
+
+pub use binaries::{build, launcher};
+pub use graph::Graph;
+pub use running::{Running, signal};

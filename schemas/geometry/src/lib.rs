@@ -5,15 +5,23 @@
 pub mod angle;
 mod body;
 mod cone;
+mod grid;
+mod map_file;
 mod polygon;
 mod pose;
 mod scene;
 mod segment;
+mod sweep;
 mod walls;
 pub mod world;
 
 pub use body::{Body, BodyKind, Prism};
 pub use cone::Cone;
+pub use grid::{
+    Cell, CellsAlong, CellsBetween, Grid, GridError, GridFrame, MOST_CELLS, Occupancy, OccupancyGrid,
+    log_odds, probability,
+};
+pub use map_file::{MapError, MapHeader, MapImage, MapMode, MapProblem};
 pub use nalgebra::{Point2, Vector2};
 pub use polygon::{Polygon, PolygonError, Shape, is_simple};
 pub use pose::Pose2;

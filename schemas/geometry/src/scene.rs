@@ -149,9 +149,14 @@ impl Scene {
     /// [`Scene::cast_ray`] for a ray that no body `without` hinders, such as one that leaves a sensor on that very body.
     pub fn cast_ray_without(&self, ray: &Ray, max_range_m: f64, without: BodyId) -> Option<Hit> {
         let reach = self.reach(ray, max_range_m);
-        let others =
-            self.bodies.iter().enumerate().filter(|(i, _)| *i != without.0).map(|(_, placed)| placed);
-        self.cast_among(ray, reach, others.filter(|placed| placed.is_present))
+        self.cast_among(ray, reach, self.present_without(Some(without)))
+    }
+
+    /// The bodies that are shown, but for one.
+    pub(crate) fn present_without(&self, own: Option<BodyId>) -> impl Iterator<Item = &Placed> {
+        let own = own.map_or(usize::MAX, |id| id.0);
+        let others = self.bodies.iter().enumerate().filter(move |(index, _)| *index != own);
+        others.map(|(_, placed)| placed).filter(|placed| placed.is_present)
     }
 
     /// The limit of a ray, and what of the walls it meets before: the part that rays of one azimuth share.
@@ -337,13 +342,12 @@ impl Scene {
                 limit_m = keep(placed_footprint.distance_to_segment_m(wall), Surface::Wall(index));
             }
         }
-        let own = without.map_or(usize::MAX, |id| id.0);
-        for (index, other) in self.bodies.iter().enumerate() {
+        let own_shape = Shape::Polygon(placed_footprint);
+        for other in self.present_without(without) {
             let apart_m = nalgebra::distance(&other.centre, &centre) - other.radius_m - radius_m;
-            if index == own || !other.is_present || apart_m >= limit_m {
+            if apart_m >= limit_m {
                 continue;
             }
-            let own_shape = Shape::Polygon(placed_footprint.clone());
             for prism in other.prisms.iter().filter(|prism| prism.reaches_between(low_m, high_m)) {
                 limit_m = keep(own_shape.distance_to_shape_m(&prism.shape), other.surface);
             }

@@ -45,6 +45,8 @@ crate::state! {
         DeviceFault = 7,
         /// The driver is leaving.
         ShuttingDown = 8,
+        /// The guard stops for something in front only, and the command leads slowly backwards, away from it.
+        Escaping = 9,
     }
 }
 
@@ -52,9 +54,9 @@ crate::state! {
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]
 pub struct AppliedWheels {
-    /// Speed of the left wheel's rim, forward positive; zero whenever the reason is not `Driving`.
+    /// Speed of the left wheel's rim, forward positive; zero whenever the reason is neither `Driving` nor `Escaping`.
     pub left_mps: f64,
-    /// Speed of the right wheel's rim, forward positive; zero whenever the reason is not `Driving`.
+    /// Speed of the right wheel's rim, forward positive; zero whenever the reason is neither `Driving` nor `Escaping`.
     pub right_mps: f64,
     /// How often since its start the driver stopped the wheels because a GO or a command was late.
     pub deadline_misses: u64,

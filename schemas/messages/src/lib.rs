@@ -23,6 +23,7 @@ mod plan;
 mod range;
 mod safety;
 mod summary;
+mod surroundings;
 mod world;
 
 #[cfg(test)]
@@ -42,6 +43,7 @@ pub use plan::*;
 pub use range::*;
 pub use safety::*;
 pub use summary::*;
+pub use surroundings::{Surroundings, body_kind};
 pub use text::{FixedText, TextTooLong};
 pub use time::Time;
 pub use world::*;

@@ -1,0 +1,314 @@
+//! The board's host, which the launcher is: it makes the board, holds every topic, cleans up after the dead, and takes the board down.
+//!
+//! Topics are made here, before any service lives, because a process that is killed while it makes one can leave it unusable
+//! for ever. Services only open them.
+
+use crate::manifest::Manifest;
+use crate::place::{self, InvalidBoardName, Place};
+use crate::switchboard::{self, SlotState, Switchboard};
+use crate::transport::{Member, RawTopic, TopicShape, TransportError};
+use rustix::fs::{FlockOperation, flock};
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
+use std::path::Path;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+pub(crate) const SWITCHBOARD: &str = "switchboard";
+const LOCK: &str = "launcher.lock";
+/// Readers of a topic beyond those of the graph: tools, recorders, newcomers of a swap, ports of the dead that were not cleaned up yet.
+const SPARE_READERS: usize = 12;
+
+/// Why a board cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum HostError {
+    /// The name.
+    #[error(transparent)]
+    Name(#[from] InvalidBoardName),
+    /// It is up.
+    #[error(
+        "the board `{board}` is up already (launcher {pid}); stop it with `launch stop --board {board}`, or use another name with --board"
+    )]
+    Taken {
+        /// The board.
+        board: String,
+        /// Its launcher's process.
+        pid: u32,
+    },
+    /// Too many topics.
+    #[error("the graph has {topics} topics; a board holds {}", switchboard::TOPICS)]
+    TooManyTopics {
+        /// How many.
+        topics: usize,
+    },
+    /// Files.
+    #[error("the board's files: {0}")]
+    Io(#[from] io::Error),
+    /// The transport.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+}
+
+/// What a service's health is published on.
+pub fn health_topic(role: &str) -> String {
+    format!("health/{role}")
+}
+
+/// A board that this process has made and keeps alive.
+pub struct Host {
+    place: Place,
+    switchboard: Switchboard,
+    manifest: Manifest,
+    _lock: File,
+    _topics: Vec<RawTopic>,
+    _member: Member,
+}
+
+impl std::fmt::Debug for Host {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Host").field("place", &self.place).finish_non_exhaustive()
+    }
+}
+
+impl Host {
+    /// Makes a board with these topics.
+    ///
+    /// # Errors
+    /// When a board of this name is up, or shared memory fails.
+    pub fn create(name: &str, manifest: Manifest, lockstep: bool) -> Result<Self, HostError> {
+        let place = Place::new(name)?;
+        if manifest.topics.len() > switchboard::TOPICS {
+            return Err(HostError::TooManyTopics { topics: manifest.topics.len() });
+        }
+        if let Some(pid) = living_launcher(&place) {
+            return Err(HostError::Taken { board: name.to_owned(), pid });
+        }
+        clear(&place)?;
+        place.create()?;
+        let lock =
+            OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(place.file(LOCK))?;
+        flock(&lock, FlockOperation::NonBlockingLockExclusive).map_err(io::Error::from)?;
+        use std::io::Write as _;
+        writeln!(&lock, "{}", std::process::id())?;
+        let switchboard = Switchboard::create(&place.file(SWITCHBOARD))?;
+        switchboard.header().lockstep.store(u32::from(lockstep), Ordering::Release);
+        let member = Member::join(&place)?;
+        let mut topics = Vec::with_capacity(manifest.topics.len());
+        for topic in &manifest.topics {
+            let shape = TopicShape {
+                fingerprint: topic.message.fingerprint(),
+                depth: topic.depth,
+                readers: topic.readers.len() + SPARE_READERS,
+            };
+            topics.push(member.create(&topic.name, shape)?);
+        }
+        let manifest = Manifest { launcher_pid: std::process::id(), ..manifest };
+        manifest.write(&place)?;
+        Ok(Self { place, switchboard, manifest, _lock: lock, _topics: topics, _member: member })
+    }
+
+    /// Where it lies.
+    pub fn place(&self) -> &Place {
+        &self.place
+    }
+
+    /// The shared page.
+    pub fn switchboard(&self) -> &Switchboard {
+        &self.switchboard
+    }
+
+    /// The table of contents.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// Prepares a slot for a service that is about to be started, with a generation of its own, and gives it the right to publish
+    /// the topics of `role` when it is the one that `speaks`. Returns the slot, `None` when all are taken.
+    pub fn prepare(&self, role: &str, speaks: bool) -> Option<u32> {
+        let slot = self.switchboard.claim(role, 0, true)?;
+        let generation = self.switchboard.header().generations.fetch_add(1, Ordering::AcqRel) + 1;
+        self.switchboard.slot(slot)?.generation.store(generation, Ordering::Release);
+        if speaks {
+            self.hand_over(role, slot);
+        }
+        Some(slot)
+    }
+
+    /// From now on the messages of the process in `slot` count on the topics of `role`, and nobody else's.
+    pub fn hand_over(&self, role: &str, slot: u32) {
+        let Some(generation) =
+            self.switchboard.slot(slot).map(|slot| slot.generation.load(Ordering::Acquire))
+        else {
+            return;
+        };
+        let health = health_topic(role);
+        for (index, topic) in self.manifest.topics.iter().enumerate() {
+            if (topic.publisher.as_deref() == Some(role) || topic.name == health)
+                && let Some(entry) = self.switchboard.topic(index as u32)
+            {
+                entry.publisher.store(slot, Ordering::Release);
+                entry.generation.store(generation, Ordering::Release);
+            }
+        }
+    }
+
+    /// Takes the board down and leaves nothing behind. The services must be gone.
+    ///
+    /// # Errors
+    /// When a file cannot be removed.
+    pub fn take_down(self) -> io::Result<()> {
+        let Self { place, switchboard, _lock: lock, _topics: topics, _member: member, .. } = self;
+        drop(topics);
+        drop(member);
+        drop(switchboard);
+        let removed = place.remove();
+        drop(lock);
+        removed
+    }
+}
+
+/// The process of the launcher that holds this board, if it lives.
+pub fn living_launcher(place: &Place) -> Option<u32> {
+    let lock = OpenOptions::new().read(true).write(true).open(place.file(LOCK)).ok()?;
+    match flock(&lock, FlockOperation::NonBlockingLockExclusive) {
+        Ok(()) => None,
+        Err(_) => Some(std::fs::read_to_string(place.file(LOCK)).ok()?.trim().parse().unwrap_or(0)),
+    }
+}
+
+/// What was found of a board whose launcher is gone.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Swept {
+    /// The board.
+    pub board: String,
+    /// Services that were still there and were ended: name and process.
+    pub ended: Vec<(String, u32)>,
+    /// Files and shared memory removed.
+    pub files: usize,
+}
+
+/// Clears away every board of this user whose launcher is gone, and says what it was.
+///
+/// # Errors
+/// When something cannot be removed.
+pub fn sweep() -> io::Result<Vec<Swept>> {
+    let mut swept = Vec::new();
+    for place in place::places() {
+        if living_launcher(&place).is_none() {
+            swept.extend(clear(&place)?);
+        }
+    }
+    Ok(swept)
+}
+
+/// Clears away what is left of a board whose launcher is gone.
+///
+/// # Errors
+/// When something cannot be removed.
+pub fn clear(place: &Place) -> io::Result<Option<Swept>> {
+    let shared_memory = place.shared_memory().len();
+    if !place.exists() && shared_memory == 0 {
+        return Ok(None);
+    }
+    let ended = end_services(place);
+    let files = shared_memory + count_files(place.root());
+    place.remove()?;
+    Ok(Some(Swept { board: place.name().to_owned(), ended, files }))
+}
+
+/// Ends the services of a board whose launcher is gone: politely first, since the base driver stops the wheels on its way out.
+fn end_services(place: &Place) -> Vec<(String, u32)> {
+    let Ok(switchboard) = Switchboard::open(&place.file(SWITCHBOARD)) else { return Vec::new() };
+    let living = || -> Vec<(String, u32)> {
+        switchboard
+            .taken()
+            .filter(|(_, slot)| slot.is_service.load(Ordering::Relaxed) != 0)
+            .map(|(_, slot)| (slot.role(), slot.pid.load(Ordering::Relaxed)))
+            .filter(|&(_, pid)| is_of_board(pid, place))
+            .collect()
+    };
+    let ended = living();
+    let send = |signal| {
+        for (_, pid) in living() {
+            if let Some(pid) = i32::try_from(pid).ok().and_then(rustix::process::Pid::from_raw) {
+                let _ = rustix::process::kill_process(pid, signal);
+            }
+        }
+    };
+    send(rustix::process::Signal::TERM);
+    let deadline = crate::clock::monotonic().after(Duration::from_millis(500));
+    while !living().is_empty() && crate::clock::monotonic() < deadline {
+        crate::clock::sleep(Duration::from_millis(5));
+    }
+    send(rustix::process::Signal::KILL);
+    let deadline = crate::clock::monotonic().after(Duration::from_millis(500));
+    while !living().is_empty() && crate::clock::monotonic() < deadline {
+        crate::clock::sleep(Duration::from_millis(2));
+    }
+    ended
+}
+
+/// Whether this process lives and has the board's page mapped: process numbers are used again, and a page that was written by a broken process
+/// must not make us end a stranger.
+fn is_of_board(pid: u32, place: &Place) -> bool {
+    let page = place.file(SWITCHBOARD);
+    pid != 0
+        && switchboard::process_lives(pid)
+        && std::fs::read_to_string(format!("/proc/{pid}/maps"))
+            .is_ok_and(|maps| maps.lines().any(|line| line.ends_with(&*page.to_string_lossy())))
+}
+
+fn count_files(folder: &Path) -> usize {
+    let Ok(entries) = std::fs::read_dir(folder) else { return 0 };
+    entries
+        .flatten()
+        .map(|entry| if entry.path().is_dir() { 1 + count_files(&entry.path()) } else { 1 })
+        .sum()
+}
+
+/// Cleans up after processes of this board that died: their ports, their memory, and what they had half made. It can hang when a
+/// process died at a bad moment, so the launcher runs it in a helper process with a time limit.
+///
+/// # Errors
+/// When the board cannot be joined.
+pub fn clean_dead(name: &str) -> Result<usize, HostError> {
+    let place = Place::new(name)?;
+    // Whoever died while making a file leaves it half made, and the transport waits for its end.
+    remove_half_made(&place, Duration::from_secs(1));
+    let member = Member::join(&place)?;
+    Ok(member.clean())
+}
+
+/// Removes files that a dead process has begun and not finished: write-protected when whole, they are still writable.
+fn remove_half_made(place: &Place, age: Duration) {
+    let old = |path: &Path| {
+        let modified = std::fs::symlink_metadata(path).and_then(|found| found.modified());
+        modified.is_ok_and(|time| time.elapsed().is_ok_and(|passed| passed >= age))
+    };
+    let mode = |path: &Path| std::fs::symlink_metadata(path).map_or(0, |found| found.mode() & 0o777);
+    for file in place.shared_memory() {
+        if mode(&file) == 0o200 && old(&file) {
+            let _ = std::fs::remove_file(file);
+        }
+    }
+    let nodes = place.file("nodes");
+    for folder in
+        std::fs::read_dir(&nodes).into_iter().flatten().flatten().filter(|entry| entry.path().is_dir())
+    {
+        let id = folder.file_name().to_string_lossy().into_owned();
+        let monitor = nodes.join(format!("{}{id}.node_monitor", place.prefix()));
+        if !monitor.exists() && old(&folder.path()) {
+            let _ = std::fs::remove_dir_all(folder.path());
+        }
+    }
+}
+
+/// Every service of the page, for those who look.
+pub fn services(switchboard: &Switchboard) -> Vec<(u32, String, SlotState)> {
+    switchboard
+        .taken()
+        .filter(|(_, slot)| slot.is_service.load(Ordering::Relaxed) != 0)
+        .map(|(index, slot)| (index, slot.role(), slot.state()))
+        .collect()
+}

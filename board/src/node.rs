@@ -1,0 +1,334 @@
+//! A service's node: where its ports are declared, and what wakes it.
+
+use crate::interface::{Direction, PortDescription};
+use crate::kept::Kept;
+use crate::manifest::Manifest;
+use crate::place::Place;
+use crate::port::{Latest, Publisher, PublisherLink, Queue, Reader, ReaderLink};
+use crate::shared::Shared;
+use crate::switchboard::Switchboard;
+use crate::transport::{Member, TransportError};
+use messages::Message;
+use serde::{Serialize, de::DeserializeOwned};
+use std::rc::Rc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+/// Messages that may wait for the reader of a state: one being read, and those of one instant in lockstep.
+const LATEST_DEPTH: usize = 4;
+/// Messages that may wait for the reader of events.
+const QUEUE_DEPTH: usize = 64;
+
+/// Why a process cannot take its place on a board.
+#[derive(Debug, thiserror::Error)]
+pub enum JoinError {
+    /// No such board.
+    #[error("there is no board `{board}`; start one with `launch up`")]
+    NoBoard {
+        /// The board asked for.
+        board: String,
+    },
+    /// Something of the board cannot be read.
+    #[error("the board `{board}` cannot be read: {source}")]
+    Unreadable {
+        /// The board.
+        board: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// All places are taken.
+    #[error("the board `{board}` has {} processes already", crate::switchboard::SLOTS)]
+    Full {
+        /// The board.
+        board: String,
+    },
+    /// The topic is not on the board.
+    #[error("topic `{topic}` is not on the board `{board}`: the graph names no service that publishes it")]
+    NoTopic {
+        /// The topic.
+        topic: String,
+        /// The board.
+        board: String,
+    },
+    /// The topic carries messages of another layout.
+    #[error(
+        "topic `{topic}`: {difference} (here: this service, layout {ours:016x}; there: the board, layout {theirs:016x}); build both from one state of the sources"
+    )]
+    Layout {
+        /// The topic.
+        topic: String,
+        /// The first difference, in words.
+        difference: String,
+        /// Our layout's fingerprint.
+        ours: u64,
+        /// The board's.
+        theirs: u64,
+    },
+    /// Somebody else publishes the topic.
+    #[error(
+        "topic `{topic}` is published by `{publisher}`; one topic has one publisher, so `{role}` is refused"
+    )]
+    SecondPublisher {
+        /// The topic.
+        topic: String,
+        /// Who publishes it.
+        publisher: String,
+        /// Who asked.
+        role: String,
+    },
+    /// The transport failed.
+    #[error(transparent)]
+    Transport(#[from] TransportError),
+}
+
+/// A process's place on a board.
+pub(crate) struct Joined {
+    pub(crate) shared: Rc<Shared>,
+    pub(crate) manifest: Manifest,
+    pub(crate) member: Member,
+    pub(crate) place: Place,
+    pub(crate) publishers: Vec<PublisherLink>,
+}
+
+impl Joined {
+    /// Joins the board as `role`, in a slot that the launcher has prepared or in a free one.
+    pub(crate) fn join(place: Place, role: &str, prepared: Option<u32>) -> Result<Self, JoinError> {
+        let board = place.name().to_owned();
+        let unreadable = |source| JoinError::Unreadable { board: board.clone(), source };
+        if !place.exists() {
+            return Err(JoinError::NoBoard { board });
+        }
+        let switchboard = Switchboard::open(&place.file(crate::host::SWITCHBOARD)).map_err(unreadable)?;
+        let manifest = Manifest::read(&place).map_err(unreadable)?;
+        let slot = match prepared {
+            Some(slot) => slot,
+            None => switchboard
+                .claim(role, std::process::id(), false)
+                .ok_or_else(|| JoinError::Full { board: board.clone() })?,
+        };
+        let generation = match (prepared, switchboard.slot(slot)) {
+            (Some(_), Some(slot)) => slot.generation.load(Ordering::Acquire),
+            _ => 0,
+        };
+        let member = Member::join(&place)?;
+        let shared = Rc::new(Shared::new(switchboard, slot, generation));
+        Ok(Self { shared, manifest, member, place, publishers: Vec::new() })
+    }
+
+    pub(crate) fn open_reader(
+        &self,
+        topic: &str,
+        fingerprint: u64,
+        depth: usize,
+    ) -> Result<ReaderLink, JoinError> {
+        let (index, _) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
+        let reader = self.member.open(topic, fingerprint)?.reader(depth)?;
+        Ok(ReaderLink {
+            shared: Rc::clone(&self.shared),
+            topic: index,
+            reader,
+            generation: 0,
+            sequence: None,
+            early: None,
+        })
+    }
+
+    pub(crate) fn open_publisher(
+        &mut self,
+        topic: &str,
+        fingerprint: u64,
+        bytes: usize,
+    ) -> Result<PublisherLink, JoinError> {
+        let (index, _) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
+        let publisher = Rc::new(self.member.open(topic, fingerprint)?.publisher(bytes)?);
+        let link = PublisherLink { shared: Rc::clone(&self.shared), topic: index, publisher };
+        self.publishers.push(link.clone());
+        Ok(link)
+    }
+
+    fn no_topic(&self, topic: &str) -> JoinError {
+        JoinError::NoTopic { topic: topic.to_owned(), board: self.place.name().to_owned() }
+    }
+
+    fn check_layout<T: Message>(&self, topic: &str) -> Result<u64, JoinError> {
+        let ours = T::description();
+        let fingerprint = ours.fingerprint();
+        let (_, entry) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
+        let theirs = entry.message.fingerprint();
+        if fingerprint == theirs {
+            return Ok(fingerprint);
+        }
+        let difference =
+            ours.first_difference(&entry.message).unwrap_or_else(|| "the layouts differ".to_owned());
+        Err(JoinError::Layout { topic: topic.to_owned(), difference, ours: fingerprint, theirs })
+    }
+}
+
+/// Where a service declares its ports and what wakes it, before its first step.
+pub struct Node {
+    role: String,
+    pub(crate) joined: Option<Joined>,
+    pub(crate) ports: Vec<PortDescription>,
+    pub(crate) wakes: Vec<u32>,
+    pub(crate) period: Option<Duration>,
+}
+
+impl Node {
+    pub(crate) fn describing(role: &str) -> Self {
+        Self { role: role.to_owned(), joined: None, ports: Vec::new(), wakes: Vec::new(), period: None }
+    }
+
+    pub(crate) fn joined(role: &str, joined: Joined) -> Self {
+        Self { joined: Some(joined), ..Self::describing(role) }
+    }
+
+    /// The service's name in the graph.
+    pub fn role(&self) -> &str {
+        &self.role
+    }
+
+    /// The service's random seed, derived from the graph's seed and the service's name: equal in every run of one graph.
+    pub fn seed(&self) -> u64 {
+        let graph = self.joined.as_ref().map_or(0, |joined| joined.manifest.seed);
+        let hash = self.role.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3)
+        });
+        // SplitMix64 (Steele, Lea, Flood 2014): neighbouring seeds give unrelated streams.
+        let mut mixed = (graph ^ hash).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        mixed ^ (mixed >> 31)
+    }
+
+    /// The newest message of a topic, which some service must publish.
+    ///
+    /// # Errors
+    /// When the topic is not on the board, or carries messages of another layout.
+    pub fn latest<T: Message>(&mut self, topic: &str) -> Result<Latest<T>, JoinError> {
+        let link = self.reader::<T>(topic, Direction::Latest, true, LATEST_DEPTH)?;
+        Ok(Latest::new(topic, link, true))
+    }
+
+    /// The newest message of a topic, which nobody needs to publish.
+    ///
+    /// # Errors
+    /// When the topic carries messages of another layout.
+    pub fn optional<T: Message>(&mut self, topic: &str) -> Result<Latest<T>, JoinError> {
+        let link = self.reader::<T>(topic, Direction::Latest, false, LATEST_DEPTH)?;
+        Ok(Latest::new(topic, link, true))
+    }
+
+    /// As `latest`, for what is no sensor reading (a plan, a command, a map): its age does not count as the age of the outputs.
+    ///
+    /// # Errors
+    /// When the topic is not on the board, or carries messages of another layout.
+    pub fn reference<T: Message>(&mut self, topic: &str) -> Result<Latest<T>, JoinError> {
+        let link = self.reader::<T>(topic, Direction::Latest, true, LATEST_DEPTH)?;
+        Ok(Latest::new(topic, link, false))
+    }
+
+    /// As `reference`, for what nobody needs to publish.
+    ///
+    /// # Errors
+    /// When the topic carries messages of another layout.
+    pub fn optional_reference<T: Message>(&mut self, topic: &str) -> Result<Latest<T>, JoinError> {
+        let link = self.reader::<T>(topic, Direction::Latest, false, LATEST_DEPTH)?;
+        Ok(Latest::new(topic, link, false))
+    }
+
+    /// Every message of a topic in order, which some service must publish.
+    ///
+    /// # Errors
+    /// When the topic is not on the board, or carries messages of another layout.
+    pub fn queue<T: Message>(&mut self, topic: &str) -> Result<Queue<T>, JoinError> {
+        let link = self.reader::<T>(topic, Direction::Queue, true, QUEUE_DEPTH)?;
+        Ok(Queue::new(topic, link))
+    }
+
+    /// As `queue`, for what nobody needs to publish.
+    ///
+    /// # Errors
+    /// When the topic carries messages of another layout.
+    pub fn optional_queue<T: Message>(&mut self, topic: &str) -> Result<Queue<T>, JoinError> {
+        let link = self.reader::<T>(topic, Direction::Queue, false, QUEUE_DEPTH)?;
+        Ok(Queue::new(topic, link))
+    }
+
+    /// The right to publish on a topic.
+    ///
+    /// # Errors
+    /// When the topic is not on the board, carries messages of another layout, or belongs to another service.
+    pub fn publisher<T: Message>(&mut self, topic: &str) -> Result<Publisher<T>, JoinError> {
+        self.describe::<T>(topic, Direction::Publish, true, 0);
+        let role = self.role.clone();
+        let Some(joined) = &mut self.joined else { return Ok(Publisher::new(topic, None)) };
+        let fingerprint = joined.check_layout::<T>(topic)?;
+        let owner = joined.manifest.topic(topic).and_then(|(_, entry)| entry.publisher.clone());
+        if let Some(publisher) = owner.filter(|owner| *owner != role) {
+            return Err(JoinError::SecondPublisher { topic: topic.to_owned(), publisher, role });
+        }
+        // Room for a few dozen elements from the start; the memory grows by itself.
+        let bytes =
+            if T::HAS_ELEMENTS { size_of::<T>() + 64 * size_of::<T::Element>() } else { size_of::<T>() };
+        let link = joined.open_publisher(topic, fingerprint, bytes)?;
+        if let Some(entry) = joined.shared.switchboard.topic(link.topic)
+            && link.is_heard()
+        {
+            entry.publisher.store(joined.shared.slot, Ordering::Release);
+        }
+        Ok(Publisher::new(topic, Some(link)))
+    }
+
+    /// A message on this port makes the service take a step.
+    pub fn wake_on(&mut self, port: &impl Reader) {
+        let topic = port.topic();
+        for description in self.ports.iter_mut().filter(|port| port.topic == topic) {
+            description.wakes |= description.direction != Direction::Publish;
+        }
+        if let Some(joined) = &self.joined
+            && let Some((index, _)) = joined.manifest.topic(topic)
+        {
+            self.wakes.push(index);
+        }
+    }
+
+    /// The service takes a step at least once in every such period, on the multiples of it.
+    pub fn every(&mut self, period: Duration) {
+        self.period = Some(period.max(Duration::from_micros(10)));
+    }
+
+    /// A state that outlives the process: saved by its predecessor of the same role, restored after a crash or a swap.
+    pub fn kept<S: Serialize + DeserializeOwned>(&self) -> Kept<S> {
+        Kept::new(self.joined.as_ref().map(|joined| joined.place.file(&format!("state-{}.json", self.role))))
+    }
+
+    fn reader<T: Message>(
+        &mut self,
+        topic: &str,
+        direction: Direction,
+        required: bool,
+        depth: usize,
+    ) -> Result<Option<ReaderLink>, JoinError> {
+        self.describe::<T>(topic, direction, required, depth);
+        let Some(joined) = &self.joined else { return Ok(None) };
+        if !required && joined.manifest.topic(topic).is_none() {
+            return Ok(None);
+        }
+        let fingerprint = joined.check_layout::<T>(topic)?;
+        Ok(Some(joined.open_reader(topic, fingerprint, depth)?))
+    }
+
+    fn describe<T: Message>(&mut self, topic: &str, direction: Direction, required: bool, depth: usize) {
+        let message = T::description();
+        let fingerprint = format!("{:016x}", message.fingerprint());
+        self.ports.push(PortDescription {
+            topic: topic.to_owned(),
+            direction,
+            required,
+            depth,
+            wakes: false,
+            message,
+            fingerprint,
+        });
+    }
+}

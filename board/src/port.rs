@@ -1,0 +1,315 @@
+//! The typed ports of a service: thin checked views over bytes in shared memory.
+
+use crate::shared::{Shared, Visibility};
+use crate::transport::{Envelope, RawLoan, RawMessage, RawPublisher, RawReader, TransportError};
+use messages::{Message, Stamped, Time, View, elements_offset};
+use std::marker::PhantomData;
+use std::rc::Rc;
+use std::sync::atomic::Ordering;
+use zerocopy::FromBytes as _;
+
+/// A port that reads a topic.
+pub trait Reader {
+    /// The topic's name.
+    fn topic(&self) -> &str;
+}
+
+/// A subscription that has joined: bytes in the order of their publication.
+pub(crate) struct ReaderLink {
+    pub(crate) shared: Rc<Shared>,
+    pub(crate) topic: u32,
+    pub(crate) reader: RawReader,
+    pub(crate) generation: u32,
+    pub(crate) sequence: Option<u64>,
+    /// Lockstep: a message that was taken from the transport and may not be seen yet.
+    pub(crate) early: Option<RawMessage>,
+}
+
+impl ReaderLink {
+    /// The next message that this step may see.
+    pub(crate) fn next(&mut self) -> Option<RawMessage> {
+        loop {
+            let message = self.early.take().or_else(|| self.reader.receive())?;
+            let envelope = *message.envelope();
+            match self.shared.visibility(Time::from_nanos(envelope.stamp_ns), envelope.round) {
+                Visibility::Now => {}
+                Visibility::Later => {
+                    self.early = Some(message);
+                    return None;
+                }
+                Visibility::Never => {
+                    self.shared.invalid.set(self.shared.invalid.get() + 1);
+                    continue;
+                }
+            }
+            // After a hand-over the last words of the predecessor may still arrive; they do not count.
+            if envelope.generation < self.generation {
+                continue;
+            }
+            self.generation = envelope.generation;
+            return Some(message);
+        }
+    }
+
+    /// Counts the messages that overflow has swallowed before this one.
+    pub(crate) fn count_gap(&mut self, sequence: u64) {
+        if let Some(last) = self.sequence
+            && sequence > last
+        {
+            self.shared.lost.set(self.shared.lost.get() + (sequence - last - 1));
+        }
+        self.sequence = Some(sequence);
+    }
+}
+
+/// The newest message of a topic, however often it changed.
+pub struct Latest<T> {
+    name: String,
+    link: Option<ReaderLink>,
+    held: Option<RawMessage>,
+    ages: bool,
+    marker: PhantomData<T>,
+}
+
+impl<T: Message> Latest<T> {
+    pub(crate) fn new(name: &str, link: Option<ReaderLink>, ages: bool) -> Self {
+        Self { name: name.to_owned(), link, held: None, ages, marker: PhantomData }
+    }
+
+    /// The newest message, borrowed from shared memory; the same one again if nothing came since. `None` before the first.
+    pub fn read(&mut self) -> Option<Stamped<'_, T>> {
+        let link = self.link.as_mut()?;
+        while let Some(message) = link.next() {
+            // A message that is not what its topic says is left out; the last good one stays.
+            if View::<T>::parse(message.bytes()).is_ok() {
+                self.held = Some(message);
+            } else {
+                link.shared.invalid.set(link.shared.invalid.get() + 1);
+            }
+        }
+        let stamped = stamped(self.held.as_ref()?)?;
+        if self.ages {
+            link.shared.note_origin(stamped.origin);
+        }
+        Some(stamped)
+    }
+
+    /// Whether the process that publishes this topic is there and takes steps.
+    pub fn publisher_lives(&self) -> bool {
+        let Some(link) = &self.link else { return false };
+        let Some(entry) = link.shared.switchboard.topic(link.topic) else { return false };
+        let publisher = link.shared.switchboard.slot(entry.publisher.load(Ordering::Acquire));
+        publisher.is_some_and(|slot| slot.state() == crate::switchboard::SlotState::Running)
+    }
+}
+
+impl<T> Reader for Latest<T> {
+    fn topic(&self) -> &str {
+        &self.name
+    }
+}
+
+/// Every message of a topic, in order.
+pub struct Queue<T> {
+    name: String,
+    link: Option<ReaderLink>,
+    held: Option<RawMessage>,
+    marker: PhantomData<T>,
+}
+
+impl<T: Message> Queue<T> {
+    pub(crate) fn new(name: &str, link: Option<ReaderLink>) -> Self {
+        Self { name: name.to_owned(), link, held: None, marker: PhantomData }
+    }
+
+    /// The next message that was not read yet, borrowed from shared memory. Messages that overflow has swallowed are counted in the health.
+    #[allow(clippy::should_implement_trait)]
+    pub fn next(&mut self) -> Option<Stamped<'_, T>> {
+        let link = self.link.as_mut()?;
+        loop {
+            let message = link.next()?;
+            link.count_gap(message.envelope().sequence);
+            if View::<T>::parse(message.bytes()).is_ok() {
+                self.held = Some(message);
+                break;
+            }
+            link.shared.invalid.set(link.shared.invalid.get() + 1);
+        }
+        let stamped = stamped(self.held.as_ref()?)?;
+        link.shared.note_origin(stamped.origin);
+        Some(stamped)
+    }
+}
+
+impl<T> Reader for Queue<T> {
+    fn topic(&self) -> &str {
+        &self.name
+    }
+}
+
+fn stamped<T: Message>(message: &RawMessage) -> Option<Stamped<'_, T>> {
+    let envelope = message.envelope();
+    let view = View::<T>::parse(message.bytes()).ok()?;
+    Some(Stamped {
+        stamp: Time::from_nanos(envelope.stamp_ns),
+        origin: Time::from_nanos(envelope.origin_ns),
+        sequence: envelope.sequence,
+        message: view.message,
+        elements: view.elements,
+    })
+}
+
+/// A publication that has joined.
+#[derive(Clone)]
+pub(crate) struct PublisherLink {
+    pub(crate) shared: Rc<Shared>,
+    pub(crate) topic: u32,
+    pub(crate) publisher: Rc<RawPublisher>,
+}
+
+impl PublisherLink {
+    pub(crate) fn loan(&self, bytes: usize) -> Result<RawLoan, TransportError> {
+        self.publisher.loan(bytes)
+    }
+
+    /// Whether this process's messages count: in a swap the newcomer is mute until the launcher hands it the topic.
+    pub(crate) fn is_heard(&self) -> bool {
+        let entry = self.shared.switchboard.topic(self.topic);
+        entry.is_some_and(|entry| entry.generation.load(Ordering::Acquire) == self.shared.generation)
+    }
+
+    pub(crate) fn send(&self, loan: RawLoan) -> Result<(), TransportError> {
+        let now = self.shared.clock();
+        self.send_stamped(loan, now, self.shared.origin(now))
+    }
+
+    pub(crate) fn send_stamped(
+        &self,
+        loan: RawLoan,
+        stamp: Time,
+        origin: Time,
+    ) -> Result<(), TransportError> {
+        if self.is_heard() {
+            self.send_in_generation(loan, stamp, origin, self.shared.generation)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// For tools: in the name of whoever publishes the topic.
+    pub(crate) fn send_as_outsider(&self, loan: RawLoan, stamp: Time) -> Result<(), TransportError> {
+        let entry = self.shared.switchboard.topic(self.topic);
+        let generation = entry.map_or(0, |entry| entry.generation.load(Ordering::Acquire));
+        self.send_in_generation(loan, stamp, stamp, generation)
+    }
+
+    fn send_in_generation(
+        &self,
+        loan: RawLoan,
+        stamp: Time,
+        origin: Time,
+        generation: u32,
+    ) -> Result<(), TransportError> {
+        let Some(entry) = self.shared.switchboard.topic(self.topic) else { return Ok(()) };
+        let sequence = entry.count.load(Ordering::Relaxed) + 1;
+        loan.send(Envelope {
+            stamp_ns: stamp.as_nanos(),
+            origin_ns: origin.as_nanos(),
+            sequence,
+            generation,
+            round: self.shared.round(),
+        })?;
+        entry.last_stamp_ns.store(stamp.as_nanos(), Ordering::Relaxed);
+        entry.count.store(sequence, Ordering::Release);
+        // In lockstep the conductor says whose turn it is.
+        if !self.shared.lockstep {
+            self.shared.switchboard.ring_readers(self.topic);
+        }
+        Ok(())
+    }
+}
+
+/// The right to publish on a topic.
+pub struct Publisher<T> {
+    name: String,
+    link: Option<PublisherLink>,
+    marker: PhantomData<T>,
+}
+
+impl<T: Message> Publisher<T> {
+    pub(crate) fn new(name: &str, link: Option<PublisherLink>) -> Self {
+        Self { name: name.to_owned(), link, marker: PhantomData }
+    }
+
+    /// Publishes a message without elements.
+    pub fn publish(&mut self, message: &T) {
+        self.publish_with(message, &[]);
+    }
+
+    /// Publishes a message with elements, which are copied into shared memory. Large ones are written in place, with `loan`.
+    pub fn publish_with(&mut self, message: &T, elements: &[T::Element]) {
+        let Some(mut loan) = self.loan(elements.len()) else { return };
+        let (place, places) = loan.parts();
+        *place = *message;
+        places.copy_from_slice(elements);
+        loan.send();
+    }
+
+    /// Memory for a message with so many elements, to be filled in place and sent. What is not written holds old bytes.
+    ///
+    /// `None` when the transport has no memory left, which is reported once a second at most.
+    pub fn loan(&mut self, elements: usize) -> Option<Loan<'_, T>> {
+        let bytes = if T::HAS_ELEMENTS {
+            elements_offset(size_of::<T>()) + elements * size_of::<T::Element>()
+        } else {
+            size_of::<T>()
+        };
+        let link = self.link.as_ref()?;
+        match link.loan(bytes) {
+            Ok(raw) => Some(Loan { raw, link, name: &self.name, elements, marker: PhantomData }),
+            Err(error) => {
+                tracing::error!(topic = self.name, %error, "message lost");
+                None
+            }
+        }
+    }
+}
+
+/// A message that is being written in shared memory.
+pub struct Loan<'a, T> {
+    raw: RawLoan,
+    link: &'a PublisherLink,
+    name: &'a str,
+    elements: usize,
+    marker: PhantomData<T>,
+}
+
+impl<T: Message> Loan<'_, T> {
+    /// The fixed part and the elements, to be written.
+    pub fn parts(&mut self) -> (&mut T, &mut [T::Element]) {
+        let bytes = self.raw.bytes();
+        let offset = elements_offset(size_of::<T>()).min(bytes.len());
+        let (fixed, rest) = bytes.split_at_mut(offset);
+        let message = T::mut_from_prefix(fixed).map(|(message, _)| message);
+        let message = message.unwrap_or_else(|_| unreachable!("loans are aligned to 64 and long enough"));
+        let elements = if T::HAS_ELEMENTS && self.elements > 0 {
+            <[T::Element]>::mut_from_bytes(rest)
+                .unwrap_or_else(|_| unreachable!("loans are aligned to 64 and hold whole elements"))
+        } else {
+            &mut []
+        };
+        (message, elements)
+    }
+
+    /// Publishes it.
+    pub fn send(self) {
+        if let Err(error) = self.link.send(self.raw) {
+            tracing::error!(topic = self.name, %error, "message lost");
+        }
+    }
+}
+
+/// The bytes of a plain message.
+pub(crate) fn bytes_of<T: Message>(message: &T) -> &[u8] {
+    message.as_bytes()
+}

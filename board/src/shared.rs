@@ -1,0 +1,97 @@
+//! What the ports of one process share: the switchboard, the moment of the present step, and the counters of its health.
+
+use crate::clock;
+use crate::switchboard::{Slot, Switchboard};
+use messages::Time;
+use std::cell::Cell;
+use std::sync::atomic::Ordering;
+
+/// The state behind all ports of a node. Ports stay in their thread.
+#[derive(Debug)]
+pub(crate) struct Shared {
+    pub(crate) switchboard: Switchboard,
+    pub(crate) slot: u32,
+    pub(crate) generation: u32,
+    pub(crate) lockstep: bool,
+    /// The moment of the present step.
+    now: Cell<Time>,
+    round: Cell<u32>,
+    /// The oldest origin among the messages read in this step.
+    origin: Cell<Option<Time>>,
+    pub(crate) lost: Cell<u64>,
+    pub(crate) invalid: Cell<u64>,
+    pub(crate) oldest_input_ns: Cell<u64>,
+}
+
+impl Shared {
+    pub(crate) fn new(switchboard: Switchboard, slot: u32, generation: u32) -> Self {
+        let lockstep = switchboard.header().lockstep.load(Ordering::Acquire) != 0;
+        Self {
+            switchboard,
+            slot,
+            generation,
+            lockstep,
+            now: Cell::new(Time::ZERO),
+            round: Cell::new(0),
+            origin: Cell::new(None),
+            lost: Cell::new(0),
+            invalid: Cell::new(0),
+            oldest_input_ns: Cell::new(0),
+        }
+    }
+
+    pub(crate) fn own_slot(&self) -> Option<&Slot> {
+        self.switchboard.slot(self.slot)
+    }
+
+    pub(crate) fn begin_step(&self, now: Time, round: u32) {
+        self.now.set(now);
+        self.round.set(round);
+        self.origin.set(None);
+    }
+
+    /// The moment on the board's clock: host time live, the step's moment in lockstep.
+    pub(crate) fn clock(&self) -> Time {
+        if self.lockstep { self.now.get() } else { clock::monotonic() }
+    }
+
+    pub(crate) fn round(&self) -> u32 {
+        self.round.get()
+    }
+
+    /// Whether a message stamped so may be seen in this step.
+    ///
+    /// In lockstep a step sees what was published before its round. Live, a stamp from the future is a lie: it would stay fresh for ever.
+    pub(crate) fn visibility(&self, stamp: Time, round: u32) -> Visibility {
+        let now = self.now.get();
+        if self.lockstep {
+            return if (stamp, round) < (now, self.round.get()) {
+                Visibility::Now
+            } else {
+                Visibility::Later
+            };
+        }
+        if stamp <= now || stamp <= clock::monotonic() { Visibility::Now } else { Visibility::Never }
+    }
+
+    /// Notes that a message with this origin enters the step.
+    pub(crate) fn note_origin(&self, origin: Time) {
+        let oldest = self.origin.get().map_or(origin, |oldest| oldest.min(origin));
+        self.origin.set(Some(oldest));
+        let age = self.now.get().since(oldest).as_nanos();
+        self.oldest_input_ns.set(u64::try_from(age).unwrap_or(u64::MAX));
+    }
+
+    /// The origin of what is published now: that of the oldest input, or this moment for a sensor.
+    pub(crate) fn origin(&self, now: Time) -> Time {
+        self.origin.get().unwrap_or(now).min(now)
+    }
+}
+
+/// What a step may do with a message.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Visibility {
+    Now,
+    Later,
+    Never,
+}

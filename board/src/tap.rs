@@ -1,0 +1,162 @@
+//! The board from outside: for tools, recorders, bridges and tests, which read and publish topics that they know by name alone.
+
+use crate::clock;
+use crate::manifest::{Manifest, Topic};
+use crate::node::{JoinError, Joined};
+use crate::place::Place;
+use crate::port::{PublisherLink, ReaderLink};
+use crate::switchboard::{SlotState, Switchboard};
+use crate::transport::{Envelope, RawMessage};
+use messages::Time;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+/// A tool's place on a board.
+pub struct Tap {
+    joined: Joined,
+}
+
+impl std::fmt::Debug for Tap {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Tap").field("board", &self.joined.place.name()).finish_non_exhaustive()
+    }
+}
+
+impl Tap {
+    /// Joins a board that is up.
+    ///
+    /// # Errors
+    /// When it is not, or all its places are taken.
+    pub fn join(place: Place, tool: &str) -> Result<Self, JoinError> {
+        if crate::host::living_launcher(&place).is_none() {
+            return Err(JoinError::NoBoard { board: place.name().to_owned() });
+        }
+        let joined = Joined::join(place, tool, None)?;
+        if let Some(slot) = joined.shared.own_slot() {
+            slot.set_state(SlotState::Running);
+        }
+        Ok(Self { joined })
+    }
+
+    /// The board's table of contents.
+    pub fn manifest(&self) -> &Manifest {
+        &self.joined.manifest
+    }
+
+    /// The board's shared page.
+    pub fn switchboard(&self) -> &Switchboard {
+        &self.joined.shared.switchboard
+    }
+
+    /// Reads a topic from its last message on.
+    ///
+    /// # Errors
+    /// When there is no such topic, or it takes no more readers.
+    pub fn reader(&self, topic: &str) -> Result<TapReader, JoinError> {
+        let (index, entry) = self.topic(topic)?;
+        let link = self.joined.open_reader(topic, entry.message.fingerprint(), entry.depth)?;
+        if let Some(entry) = self.switchboard().topic(index) {
+            entry.set_wake(self.joined.shared.slot, true);
+        }
+        self.switchboard().announce_reader();
+        Ok(TapReader { link, held: None })
+    }
+
+    /// Publishes on a topic: as the outside does where the graph says so, and otherwise in the name of its publisher, beside it.
+    ///
+    /// # Errors
+    /// When there is no such topic, or it takes no more publishers.
+    pub fn publisher(&mut self, topic: &str) -> Result<TapPublisher, JoinError> {
+        let fingerprint = self.topic(topic)?.1.message.fingerprint();
+        Ok(TapPublisher { link: self.joined.open_publisher(topic, fingerprint, 4096)? })
+    }
+
+    /// Sleeps until a topic that is read has a new message, at most for `timeout`. Look for messages first: `heard` is the bell before the look.
+    pub fn wait(&self, heard: u32, timeout: Duration) {
+        if let Some(slot) = self.joined.shared.own_slot() {
+            slot.heartbeat_ns.store(clock::monotonic().as_nanos(), Ordering::Relaxed);
+            slot.wait(heard, Some(timeout));
+        }
+    }
+
+    /// The bell's count, for `wait`.
+    pub fn bell(&self) -> u32 {
+        self.joined.shared.own_slot().map_or(0, |slot| slot.bell())
+    }
+
+    fn topic(&self, name: &str) -> Result<(u32, &Topic), JoinError> {
+        self.joined.manifest.topic(name).ok_or_else(|| JoinError::NoTopic {
+            topic: name.to_owned(),
+            board: self.joined.place.name().to_owned(),
+        })
+    }
+}
+
+impl Drop for Tap {
+    fn drop(&mut self) {
+        self.joined.shared.switchboard.release(self.joined.shared.slot);
+    }
+}
+
+/// Reads the bytes of a topic.
+pub struct TapReader {
+    link: ReaderLink,
+    held: Option<RawMessage>,
+}
+
+impl std::fmt::Debug for TapReader {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TapReader").field("topic", &self.link.topic).finish_non_exhaustive()
+    }
+}
+
+impl TapReader {
+    /// The next message: its envelope and its bytes, borrowed from shared memory.
+    #[allow(clippy::should_implement_trait)]
+    pub fn next(&mut self) -> Option<(Envelope, &[u8])> {
+        // A tool sees everything that is there, in lockstep too.
+        let message = self.link.reader.receive()?;
+        let envelope = *message.envelope();
+        self.link.count_gap(envelope.sequence);
+        Some((envelope, self.held.insert(message).bytes()))
+    }
+
+    /// Messages that were overwritten before they were read.
+    pub fn lost(&self) -> u64 {
+        self.link.shared.lost.get()
+    }
+}
+
+/// Publishes bytes on a topic.
+pub struct TapPublisher {
+    link: PublisherLink,
+}
+
+impl std::fmt::Debug for TapPublisher {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TapPublisher").field("topic", &self.link.topic).finish_non_exhaustive()
+    }
+}
+
+impl TapPublisher {
+    /// Publishes these bytes, whatever they are.
+    ///
+    /// # Errors
+    /// When the transport has no memory left.
+    pub fn publish(&self, bytes: &[u8]) -> Result<(), crate::transport::TransportError> {
+        let mut loan = self.link.loan(bytes.len())?;
+        loan.bytes().copy_from_slice(bytes);
+        let now = clock::monotonic();
+        self.link.send_as_outsider(loan, now)
+    }
+}
+
+/// The moment on a board's clock.
+pub fn now(switchboard: &Switchboard) -> Time {
+    let header = switchboard.header();
+    if header.lockstep.load(Ordering::Acquire) != 0 {
+        Time::from_nanos(header.logical_ns.load(Ordering::Acquire))
+    } else {
+        clock::monotonic()
+    }
+}

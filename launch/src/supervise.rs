@@ -1,0 +1,540 @@
+//! Starts the services, sees at once when one dies or hangs, cleans up after it, and starts it again.
+
+use crate::graph::{Checked, CheckedService, Publisher};
+use crate::graph::Priority;
+use board::host::{self, Host, HostError};
+use board::manifest::{Manifest, Topic};
+use board::switchboard::SlotState;
+use board::{EXIT_SETUP, clock};
+use messages::{Health, Message as _, Time};
+use rustix::event::{PollFd, PollFlags, poll};
+use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open};
+use std::collections::VecDeque;
+use std::fs::{File, OpenOptions};
+use std::io;
+use std::os::fd::{AsFd as _, OwnedFd};
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+/// Whoever publishes this drives the wheels, and leaves first when the robot is stopped.
+const WHEELS: &str = "wheels/applied";
+/// How long a service may take to join the board.
+const START_LIMIT: Duration = Duration::from_secs(10);
+/// A service that ran for so long was sound: its next restart is immediate again.
+const SOUND_AFTER: Duration = Duration::from_secs(1);
+/// How long the helper may take that cleans up after the dead.
+const CLEAN_LIMIT: Duration = Duration::from_secs(3);
+const EVENTS_KEPT: usize = 200;
+
+/// Something that the operator wants to know.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub(crate) struct Event {
+    /// Seconds since `up`.
+    pub(crate) at_s: f64,
+    /// The service, empty for the whole set.
+    pub(crate) role: String,
+    /// What happened.
+    pub(crate) text: String,
+    /// Whether something went wrong.
+    pub(crate) is_trouble: bool,
+}
+
+/// What the launcher does with a service now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Phase {
+    /// Its process lives and has not joined yet.
+    Starting,
+    /// It takes steps.
+    Running,
+    /// It died and will be started again.
+    Waiting,
+    /// It ended by itself, without an error.
+    Finished,
+    /// It is given up.
+    Failed,
+}
+
+/// One service under supervision.
+#[derive(Debug)]
+pub(crate) struct Supervised {
+    pub(crate) service: CheckedService,
+    pub(crate) phase: Phase,
+    /// Starts after the first.
+    pub(crate) restarts: u32,
+    pub(crate) slot: Option<u32>,
+    pub(crate) pid: Option<u32>,
+    process: Option<Process>,
+    /// Deaths in a row, without a sound run between them.
+    failures: u32,
+    restart_at: Option<Time>,
+    died_at: Option<Time>,
+}
+
+#[derive(Debug)]
+struct Process {
+    child: Child,
+    pidfd: OwnedFd,
+    started: Time,
+    ready: Option<Time>,
+}
+
+/// The set of services on one board.
+pub(crate) struct Supervisor {
+    pub(crate) host: Host,
+    pub(crate) services: Vec<Supervised>,
+    pub(crate) events: VecDeque<Event>,
+    /// Events so far, so that a reader knows which are new.
+    pub(crate) event_count: usize,
+    pub(crate) began: Time,
+    folder: PathBuf,
+    logs: PathBuf,
+    cleaner: Option<(Child, Time)>,
+    clean_again: bool,
+    last_tick: Time,
+}
+
+impl Supervisor {
+    /// Makes the board of a checked graph; nothing is started yet.
+    pub(crate) fn new(
+        graph: &Checked,
+        board: &str,
+        logs: Option<&Path>,
+        lockstep: bool,
+    ) -> Result<Self, HostError> {
+        let host = Host::create(board, manifest_of(graph), lockstep)?;
+        let logs = logs.map_or_else(|| host.place().file("logs"), Path::to_owned);
+        std::fs::create_dir_all(&logs)?;
+        let supervised = |service: &CheckedService| Supervised {
+            service: service.clone(),
+            phase: Phase::Waiting,
+            restarts: 0,
+            slot: None,
+            pid: None,
+            process: None,
+            failures: 0,
+            restart_at: None,
+            died_at: None,
+        };
+        let now = clock::monotonic();
+        Ok(Self {
+            host,
+            services: graph.services.iter().map(supervised).collect(),
+            events: VecDeque::new(),
+            event_count: 0,
+            began: now,
+            folder: graph.folder.clone(),
+            logs,
+            cleaner: None,
+            clean_again: false,
+            last_tick: now,
+        })
+    }
+
+    /// The file into which a service logs.
+    pub(crate) fn log_file(&self, role: &str) -> PathBuf {
+        self.logs.join(format!("{role}.log"))
+    }
+
+    /// Starts every service, in the order of the file; they wait for each other by themselves.
+    pub(crate) fn start_all(&mut self) {
+        for index in 0..self.services.len() {
+            self.start(index);
+        }
+    }
+
+    /// Looks after the services: whoever died, hangs or is due again. Call it when a child's descriptor is ready, and every 100 ms.
+    pub(crate) fn tick(&mut self) {
+        let now = clock::monotonic();
+        // When we were held up ourselves, silent heartbeats say nothing.
+        let held_up = now.since(self.last_tick) > Duration::from_millis(500);
+        self.last_tick = now;
+        for index in 0..self.services.len() {
+            self.reap(index, now);
+            self.note_ready(index, now);
+            if !held_up {
+                self.end_if_hanging(index, now);
+            }
+            if self.services[index].restart_at.is_some_and(|at| at <= now) {
+                self.services[index].restart_at = None;
+                self.services[index].restarts += 1;
+                self.start(index);
+            }
+        }
+        self.tend_cleaner(now);
+    }
+
+    /// When `tick` is due at the latest.
+    pub(crate) fn next_due(&self, now: Time) -> Duration {
+        let starting = self.services.iter().any(|service| service.phase == Phase::Starting);
+        let most = if starting { Duration::from_millis(3) } else { Duration::from_millis(100) };
+        let restarts = self.services.iter().filter_map(|service| service.restart_at);
+        restarts.map(|at| at.since(now)).fold(most, Duration::min)
+    }
+
+    /// Descriptors that become readable when a service dies.
+    pub(crate) fn descriptors(&self) -> impl Iterator<Item = &OwnedFd> {
+        self.services.iter().filter_map(|service| service.process.as_ref().map(|process| &process.pidfd))
+    }
+
+    /// Whether every service has joined the board.
+    pub(crate) fn all_ready(&self) -> bool {
+        self.services.iter().all(|service| matches!(service.phase, Phase::Running | Phase::Finished))
+    }
+
+    /// Whether every service has ended by itself.
+    pub(crate) fn all_finished(&self) -> bool {
+        !self.services.is_empty() && self.services.iter().all(|service| service.phase == Phase::Finished)
+    }
+
+    /// The service that is given up, if one is.
+    pub(crate) fn failed(&self) -> Option<&Supervised> {
+        self.services.iter().find(|service| service.phase == Phase::Failed)
+    }
+
+    /// Ends a service and starts it again; `false` when there is none of that name.
+    pub(crate) fn restart(&mut self, role: &str) -> bool {
+        let Some(index) = self.services.iter().position(|service| service.service.role == role) else { return false };
+        self.note(role, "restart asked for", false);
+        let service = &mut self.services[index];
+        service.failures = 0;
+        match &service.process {
+            Some(process) => signal(process, Signal::TERM),
+            None => service.restart_at = Some(clock::monotonic()),
+        }
+        // A process that leaves when asked ends without an error; it is to come back all the same.
+        service.phase = if service.process.is_some() { Phase::Waiting } else { service.phase };
+        true
+    }
+
+    /// Notes an event.
+    pub(crate) fn note(&mut self, role: &str, text: impl Into<String>, is_trouble: bool) {
+        if self.events.len() == EVENTS_KEPT {
+            self.events.pop_front();
+        }
+        let at_s = clock::monotonic().seconds_since(self.began);
+        self.events.push_back(Event { at_s, role: role.to_owned(), text: text.into(), is_trouble });
+        self.event_count += 1;
+    }
+
+    /// The last lines of a service's log.
+    pub(crate) fn last_log_lines(&self, role: &str, count: usize) -> Vec<String> {
+        let text = std::fs::read(self.log_file(role)).unwrap_or_default();
+        let text = String::from_utf8_lossy(&text);
+        let lines: Vec<&str> = text.lines().collect();
+        lines[lines.len().saturating_sub(count)..].iter().map(|line| (*line).to_owned()).collect()
+    }
+
+    /// Stops the robot first, then the services, and takes the board down.
+    ///
+    /// # Errors
+    /// When something of the board cannot be removed.
+    pub(crate) fn stop(mut self, hurry: &dyn Fn() -> bool) -> io::Result<()> {
+        if let Some((mut cleaner, _)) = self.cleaner.take() {
+            let _ = cleaner.kill();
+            let _ = cleaner.wait();
+        }
+        let driver = self.host.manifest().topic(WHEELS).and_then(|(_, topic)| topic.publisher.clone());
+        let (first, rest): (Vec<usize>, Vec<usize>) =
+            (0..self.services.len()).partition(|&index| Some(&self.services[index].service.role) == driver.as_ref());
+        self.end(&first, hurry);
+        self.end(&rest, hurry);
+        self.host.take_down()
+    }
+
+    fn end(&mut self, group: &[usize], hurry: &dyn Fn() -> bool) {
+        let asked = clock::monotonic();
+        for &index in group {
+            if let Some(process) = &self.services[index].process {
+                // One that was stopped cannot hear.
+                signal(process, Signal::CONT);
+                signal(process, Signal::TERM);
+            }
+        }
+        loop {
+            let now = clock::monotonic();
+            let mut waiting = Vec::new();
+            for &index in group {
+                let service = &mut self.services[index];
+                let Some(process) = &mut service.process else { continue };
+                if matches!(process.child.try_wait(), Ok(Some(_))) {
+                    service.process = None;
+                    continue;
+                }
+                let limit = if hurry() { Duration::from_millis(50) } else { service.service.launch.stop_after };
+                if now.since(asked) > limit {
+                    let _ = process.child.kill();
+                }
+                waiting.push(index);
+            }
+            if waiting.is_empty() {
+                return;
+            }
+            let mut descriptors: Vec<PollFd<'_>> = waiting
+                .iter()
+                .filter_map(|&index| self.services[index].process.as_ref())
+                .map(|process| PollFd::from_borrowed_fd(process.pidfd.as_fd(), PollFlags::IN))
+                .collect();
+            let pause = rustix::time::Timespec { tv_sec: 0, tv_nsec: 10_000_000 };
+            let _ = poll(&mut descriptors, Some(&pause));
+        }
+    }
+
+    fn start(&mut self, index: usize) {
+        let role = self.services[index].service.role.clone();
+        match self.spawn(index) {
+            Ok(()) => {}
+            Err(error) => {
+                self.services[index].phase = Phase::Failed;
+                self.note(&role, format!("cannot be started: {error}"), true);
+            }
+        }
+    }
+
+    fn spawn(&mut self, index: usize) -> io::Result<()> {
+        let service = &self.services[index].service;
+        let slot = self
+            .host
+            .prepare(&service.role, true)
+            .ok_or_else(|| io::Error::other("the board has no place left"))?;
+        let log = open_log(&self.log_file(&service.role))?;
+        let mut command = Command::new(&service.binary);
+        command
+            .args(["--board", self.host.place().name(), "--role", &service.role])
+            .args(["--slot", &slot.to_string()])
+            .args(["--params", &service.parameters.to_string()])
+            .env("RUST_LOG", &service.launch.log)
+            .current_dir(&self.folder)
+            .stdin(Stdio::null())
+            .stdout(log.try_clone()?)
+            .stderr(log)
+            // Ctrl-C is for the launcher alone, which stops the robot before the services.
+            .process_group(0);
+        for processor in &service.launch.cpu {
+            command.args(["--cpu", &processor.to_string()]);
+        }
+        match service.launch.priority {
+            Priority::Normal => {}
+            Priority::Fifo(priority) => _ = command.args(["--fifo", &priority.to_string()]),
+            Priority::Nice(nice) => _ = command.args(["--nice", &nice.to_string()]),
+        }
+        let spawned = command.spawn().and_then(|child| {
+            let pid = Pid::from_child(&child);
+            Ok((pidfd_open(pid, PidfdFlags::empty())?, child))
+        });
+        let (pidfd, child) = match spawned {
+            Ok(spawned) => spawned,
+            Err(error) => {
+                self.host.switchboard().release(slot);
+                return Err(error);
+            }
+        };
+        let pid = child.id();
+        if let Some(entry) = self.host.switchboard().slot(slot) {
+            entry.pid.store(pid, Ordering::Release);
+        }
+        let service = &mut self.services[index];
+        service.process = Some(Process { child, pidfd, started: clock::monotonic(), ready: None });
+        service.slot = Some(slot);
+        service.pid = Some(pid);
+        service.phase = Phase::Starting;
+        Ok(())
+    }
+
+    fn note_ready(&mut self, index: usize, now: Time) {
+        let Some(slot) = self.services[index].slot.and_then(|slot| self.host.switchboard().slot(slot)) else { return };
+        let joined = slot.state() == SlotState::Running;
+        let service = &mut self.services[index];
+        let Some(process) = &mut service.process else { return };
+        if !joined || process.ready.is_some() {
+            return;
+        }
+        process.ready = Some(now);
+        let took = now.seconds_since(process.started);
+        if service.phase == Phase::Starting {
+            service.phase = Phase::Running;
+        }
+        let role = service.service.role.clone();
+        if let Some(died) = service.died_at.take() {
+            let healed_ms = now.seconds_since(died) * 1e3;
+            self.note(&role, format!("back after {healed_ms:.0} ms"), false);
+        } else {
+            self.note(&role, format!("ready after {:.0} ms", took * 1e3), false);
+        }
+    }
+
+    fn reap(&mut self, index: usize, now: Time) {
+        let service = &mut self.services[index];
+        let Some(process) = &mut service.process else { return };
+        let Ok(Some(status)) = process.child.try_wait() else { return };
+        let was_sound = process.ready.is_some_and(|ready| now.since(ready) >= SOUND_AFTER);
+        let role = service.service.role.clone();
+        service.process = None;
+        service.pid = None;
+        if let Some(slot) = service.slot.take() {
+            self.host.switchboard().release(slot);
+        }
+        if status.success() && service.phase == Phase::Waiting {
+            service.restart_at = Some(now);
+            service.died_at = Some(now);
+            return;
+        }
+        if status.success() {
+            service.phase = Phase::Finished;
+            self.note(&role, "has finished", false);
+            return;
+        }
+        service.failures = if was_sound { 1 } else { service.failures + 1 };
+        let failures = service.failures;
+        let policy = service.service.launch.restart;
+        let setup = status.code() == Some(i32::from(EXIT_SETUP));
+        let how = death(status);
+        let next = match policy {
+            None => Err("it is not to be restarted".to_owned()),
+            Some(_) if setup => Err("its set-up is wrong".to_owned()),
+            Some(policy) if failures > policy.give_up_after => Err(format!("{failures} deaths in a row")),
+            // The first restart is immediate.
+            Some(_) if failures <= 1 => Ok(Duration::ZERO),
+            Some(policy) => {
+                let doublings = (failures - 2).min(20);
+                Ok((policy.backoff_min * 2_u32.pow(doublings)).min(policy.backoff_max))
+            }
+        };
+        service.died_at.get_or_insert(now);
+        match next {
+            Ok(pause) => {
+                service.phase = Phase::Waiting;
+                service.restart_at = Some(now.after(pause));
+                let when = if pause.is_zero() { "at once".to_owned() } else { format!("in {} ms", pause.as_millis()) };
+                self.note(&role, format!("{how}; starting it again {when}"), true);
+            }
+            Err(why) => {
+                service.phase = Phase::Failed;
+                let last = self.last_log_lines(&role, 1).pop().unwrap_or_default();
+                self.note(&role, format!("{how}; given up ({why}): {last}"), true);
+            }
+        }
+        self.clean();
+    }
+
+    fn end_if_hanging(&mut self, index: usize, now: Time) {
+        let service = &self.services[index];
+        let (Some(process), Some(slot)) = (&service.process, service.slot) else { return };
+        let Some(slot) = self.host.switchboard().slot(slot) else { return };
+        let limit = service.service.launch.hang_after;
+        let lockstep = self.host.switchboard().header().lockstep.load(Ordering::Relaxed) != 0;
+        let silence = match process.ready {
+            Some(_) if lockstep => return,
+            Some(_) => now.since(slot.heartbeat()),
+            None if now.since(process.started) > START_LIMIT => now.since(process.started),
+            None => return,
+        };
+        if silence <= limit {
+            return;
+        }
+        let what = if process.ready.is_none() { "did not join the board" } else { "hangs" };
+        let text = format!("{what}: silent for {:.1} s; ending it", silence.as_secs_f64());
+        signal(process, Signal::KILL);
+        let role = service.service.role.clone();
+        self.note(&role, text, true);
+    }
+
+    /// Cleans up after the dead, in a helper process, since it can hang.
+    fn clean(&mut self) {
+        if self.cleaner.is_some() {
+            self.clean_again = true;
+            return;
+        }
+        self.clean_again = false;
+        let helper = std::env::current_exe().and_then(|launcher| {
+            Command::new(launcher)
+                .args(["clean-dead", self.host.place().name()])
+                .stdin(Stdio::null())
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .process_group(0)
+                .spawn()
+        });
+        match helper {
+            Ok(child) => self.cleaner = Some((child, clock::monotonic())),
+            Err(error) => self.note("", format!("nothing cleans up after the dead: {error}"), true),
+        }
+    }
+
+    fn tend_cleaner(&mut self, now: Time) {
+        let Some((cleaner, since)) = &mut self.cleaner else { return };
+        match cleaner.try_wait() {
+            Ok(None) if now.since(*since) < CLEAN_LIMIT => return,
+            Ok(None) => {
+                let _ = cleaner.kill();
+                let _ = cleaner.wait();
+                self.note("", "cleaning up after the dead took too long and was broken off", true);
+            }
+            _ => {}
+        }
+        self.cleaner = None;
+        if self.clean_again {
+            self.clean();
+        }
+    }
+}
+
+impl Supervised {
+    /// When the present process began.
+    pub(crate) fn started(&self) -> Option<Time> {
+        self.process.as_ref().map(|process| process.started)
+    }
+}
+
+fn signal(process: &Process, signal: Signal) {
+    let _ = kill_process(Pid::from_child(&process.child), signal);
+}
+
+fn death(status: ExitStatus) -> String {
+    match (status.signal(), status.code()) {
+        (Some(9), _) => "was killed (signal 9)".to_owned(),
+        (Some(11), _) => "crashed (signal 11)".to_owned(),
+        (Some(number), _) => format!("was ended by signal {number}"),
+        (None, Some(101)) => "panicked".to_owned(),
+        (None, code) => format!("ended with code {}", code.unwrap_or(-1)),
+    }
+}
+
+fn open_log(path: &Path) -> io::Result<File> {
+    OpenOptions::new().create(true).append(true).mode(0o600).open(path)
+}
+
+fn manifest_of(graph: &Checked) -> Manifest {
+    let mut topics: Vec<Topic> = graph
+        .topics
+        .iter()
+        .map(|topic| Topic {
+            name: topic.name.clone(),
+            publisher: match &topic.publisher {
+                Publisher::Service(role) => Some(role.clone()),
+                Publisher::External | Publisher::Nobody => None,
+            },
+            readers: topic.readers.iter().map(|reader| reader.role.clone()).collect(),
+            depth: topic.depth,
+            message: topic.message.clone(),
+        })
+        .collect();
+    topics.extend(graph.services.iter().map(|service| Topic {
+        name: host::health_topic(&service.role),
+        publisher: Some(service.role.clone()),
+        readers: Vec::new(),
+        depth: 4,
+        message: Health::description(),
+    }));
+    Manifest {
+        graph: graph.file.display().to_string(),
+        seed: graph.seed,
+        topics,
+        services: graph.services.iter().map(|service| service.role.clone()).collect(),
+        launcher_pid: 0,
+    }
+}

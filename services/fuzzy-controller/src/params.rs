@@ -1,0 +1,205 @@
+//! The parameters of the fuzzy controller; their defaults are those of a PowerBot (companions 3.1, 3.6 to 3.8).
+
+use messages::Parameters;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Which sensors tell the distance of obstacles. All that are named must be fresh, or the robot stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RangeSource {
+    /// The eight time-of-flight sensors.
+    #[default]
+    Tof,
+    /// A laser's scan.
+    Scan,
+    /// Both; the nearer counts.
+    Both,
+    /// None: no avoidance.
+    None,
+}
+
+/// The parameters of the fuzzy controller.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Params {
+    /// Distance between the wheels, in metres.
+    pub track_m: f64,
+    /// The fastest that a wheel is told to turn; the speeds in the rule files are scaled by it.
+    pub top_speed_mps: f64,
+    /// The top speed for which the rule files are written.
+    pub rules_top_speed_mps: f64,
+    /// The most that a wheel's speed changes in a second, stops apart.
+    pub acceleration_mps2: f64,
+    /// Time between two steps.
+    pub period_ms: u64,
+    /// Poses and ranges older than this stop the robot.
+    pub input_max_age_ms: u64,
+    /// A command older than this stops the robot.
+    pub command_max_age_ms: u64,
+    /// The last waypoint is reached within this distance.
+    pub reach_tolerance_m: f64,
+    /// An intermediate waypoint is passed within this distance, or when it lies behind.
+    pub pass_distance_m: f64,
+    /// How far ahead on the path the robot aims. 0 aims at the next waypoint, as the paper does.
+    pub lookahead_m: f64,
+    /// Targets, and corners of the path, nearer than this are turned at before driving (ASN-146).
+    pub rotation_distance_m: f64,
+    /// A turn on the spot begins above this error.
+    pub rotation_begin_rad: f64,
+    /// A turn on the spot ends below this error.
+    pub rotation_end_rad: f64,
+    /// Above this error the robot turns on the spot however far the target is; π: never.
+    pub rotation_always_rad: f64,
+    /// The least wheel speed in a turn on the spot.
+    pub rotation_least_mps: f64,
+    /// A commanded turn ends below this error.
+    pub turn_tolerance_rad: f64,
+    /// Speed of creeping and of backing off.
+    pub creep_speed_mps: f64,
+    /// Which sensors tell the distance of obstacles.
+    pub range_source: RangeSource,
+    /// Avoidance takes over below this clearance in front.
+    pub front_trigger_m: f64,
+    /// Avoidance takes over below this clearance at the sides; below the corridor's, or the robot shies at every wall.
+    pub side_trigger_m: f64,
+    /// Below this clearance in front the robot brakes at once, and then only turns.
+    pub brake_distance_m: f64,
+    /// By how much clearances beside the laser cones, from 50 to 110 degrees, are stretched.
+    pub lateral_factor: f64,
+    /// This near to the goal there is no avoidance (companions 3.7).
+    pub goal_without_avoidance_m: f64,
+    /// Avoidance for longer than this without progress is reported as blocked (companions 3.8).
+    pub blocked_after_ms: u64,
+    /// What counts as progress.
+    pub progress_m: f64,
+    /// The hull ahead of the turning centre.
+    pub hull_front_m: f64,
+    /// The hull behind the turning centre.
+    pub hull_rear_m: f64,
+    /// Half of the hull's width.
+    pub hull_side_m: f64,
+    /// A file with the motion controller's rules in FCL; empty for the built-in ones.
+    pub motion_rules: String,
+    /// A file with the avoidance controller's rules in FCL; empty for the built-in ones.
+    pub avoidance_rules: String,
+    /// A file with the rotation controller's rules in FCL; empty for the built-in ones.
+    pub rotation_rules: String,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            track_m: 0.536,
+            top_speed_mps: 0.47,
+            rules_top_speed_mps: 0.47,
+            acceleration_mps2: 0.3,
+            period_ms: 50,
+            input_max_age_ms: 500,
+            command_max_age_ms: 1000,
+            reach_tolerance_m: 0.05,
+            pass_distance_m: 0.20,
+            lookahead_m: 0.6,
+            rotation_distance_m: 0.5,
+            rotation_begin_rad: 20_f64.to_radians(),
+            rotation_end_rad: 5_f64.to_radians(),
+            rotation_always_rad: std::f64::consts::PI,
+            rotation_least_mps: 0.03,
+            turn_tolerance_rad: 2_f64.to_radians(),
+            creep_speed_mps: 0.10,
+            range_source: RangeSource::Tof,
+            front_trigger_m: 0.5,
+            side_trigger_m: 0.5,
+            brake_distance_m: 0.2,
+            lateral_factor: 1.5,
+            goal_without_avoidance_m: 0.3,
+            blocked_after_ms: 8000,
+            progress_m: 0.3,
+            hull_front_m: 0.369,
+            hull_rear_m: 0.542,
+            hull_side_m: 0.340,
+            motion_rules: String::new(),
+            avoidance_rules: String::new(),
+            rotation_rules: String::new(),
+        }
+    }
+}
+
+/// What is wrong with the parameters.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ParamsError {
+    /// A number outside its limits.
+    #[error("{name} = {value} must lie from {low} to {high}")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The least it may be.
+        low: f64,
+        /// The most it may be.
+        high: f64,
+    },
+    /// Two that must differ in this order do not.
+    #[error("{small_name} = {small} must be below {large_name} = {large}")]
+    Order {
+        /// The parameter that must be smaller.
+        small_name: &'static str,
+        /// Its value.
+        small: f64,
+        /// The parameter that must be larger.
+        large_name: &'static str,
+        /// Its value.
+        large: f64,
+    },
+}
+
+impl Parameters for Params {
+    type Error = ParamsError;
+
+    fn check(&self) -> Result<(), ParamsError> {
+        let pi = std::f64::consts::PI;
+        for (name, value, low, high) in [
+            ("track_m", self.track_m, 0.05, 5.0),
+            ("top_speed_mps", self.top_speed_mps, 0.01, 5.0),
+            ("rules_top_speed_mps", self.rules_top_speed_mps, 0.01, 5.0),
+            ("acceleration_mps2", self.acceleration_mps2, 0.01, 20.0),
+            ("period_ms", self.period_ms as f64, 1.0, 1000.0),
+            ("input_max_age_ms", self.input_max_age_ms as f64, 1.0, 10_000.0),
+            ("command_max_age_ms", self.command_max_age_ms as f64, 1.0, 3_600_000.0),
+            ("reach_tolerance_m", self.reach_tolerance_m, 0.005, 2.0),
+            ("pass_distance_m", self.pass_distance_m, 0.01, 2.0),
+            ("lookahead_m", self.lookahead_m, 0.0, 5.0),
+            ("rotation_distance_m", self.rotation_distance_m, 0.0, 10.0),
+            ("rotation_begin_rad", self.rotation_begin_rad, 0.01, pi),
+            ("rotation_end_rad", self.rotation_end_rad, 0.005, pi),
+            ("rotation_always_rad", self.rotation_always_rad, 0.01, pi),
+            ("rotation_least_mps", self.rotation_least_mps, 0.0, self.top_speed_mps),
+            ("turn_tolerance_rad", self.turn_tolerance_rad, 0.002, 1.0),
+            ("creep_speed_mps", self.creep_speed_mps, 0.005, self.top_speed_mps),
+            ("front_trigger_m", self.front_trigger_m, 0.01, 10.0),
+            ("side_trigger_m", self.side_trigger_m, 0.01, 10.0),
+            ("brake_distance_m", self.brake_distance_m, 0.0, 10.0),
+            ("lateral_factor", self.lateral_factor, 1.0, 10.0),
+            ("goal_without_avoidance_m", self.goal_without_avoidance_m, 0.0, 10.0),
+            ("blocked_after_ms", self.blocked_after_ms as f64, 100.0, 3_600_000.0),
+            ("progress_m", self.progress_m, 0.01, 10.0),
+            ("hull_front_m", self.hull_front_m, 0.01, 5.0),
+            ("hull_rear_m", self.hull_rear_m, 0.01, 5.0),
+            ("hull_side_m", self.hull_side_m, 0.01, 5.0),
+        ] {
+            if !(low..=high).contains(&value) {
+                return Err(ParamsError::OutOfRange { name, value, low, high });
+            }
+        }
+        for (small_name, small, large_name, large) in [
+            ("rotation_end_rad", self.rotation_end_rad, "rotation_begin_rad", self.rotation_begin_rad),
+            ("brake_distance_m", self.brake_distance_m, "front_trigger_m", self.front_trigger_m),
+        ] {
+            if small >= large {
+                return Err(ParamsError::Order { small_name, small, large_name, large });
+            }
+        }
+        Ok(())
+    }
+}

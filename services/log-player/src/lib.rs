@@ -1,0 +1,193 @@
+//! Plays a recorded drive onto the board: odometry, radio ranges, laser scans and, where it is known, the truth.
+//!
+//! Everything is published in one frame, that of the true poses; a log is read whole before the first step, and a step says what is
+//! due.
+
+mod carmen;
+mod files;
+mod log;
+mod params;
+mod steps;
+
+#[cfg(test)]
+mod tests;
+
+pub use carmen::read as read_carmen;
+pub use files::{LoadError, load};
+pub use log::{Entry, Fault, Log, PROBLEM_LIMIT, Problem, Record};
+pub use params::{AnchorPlace, Format, Params, ParamsError, Pose, Timing};
+pub use steps::read as read_steps;
+
+use geometry::Pose2;
+use messages::{ANCHOR_CAPACITY, AnchorRange, Odometry, Parameters, RangeScan, TagRanges, Time, TruePose};
+use std::time::Duration;
+
+/// A message of the log.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Due {
+    /// For `wheels/odometry`.
+    Odometry(Odometry),
+    /// For `tag/ranges`.
+    Tag(Box<TagRanges>),
+    /// For `laser/scan`: the header and one range a beam.
+    Scan(RangeScan, Vec<f32>),
+    /// For `truth/pose`.
+    Truth(TruePose),
+}
+
+/// The player.
+#[derive(Debug, Clone)]
+pub struct LogPlayer {
+    /// Messages, each with the time since the beginning of the play at which it is due.
+    play: Vec<(Duration, Due)>,
+    due: Vec<Due>,
+    next: usize,
+    begun: Option<Time>,
+    problems: Vec<Problem>,
+    problem_count: usize,
+}
+
+impl LogPlayer {
+    /// A player of a log that is read already.
+    ///
+    /// # Errors
+    /// When the parameters make no sense.
+    pub fn new(params: &Params, log: Log) -> Result<Self, ParamsError> {
+        params.check()?;
+        let Log { entries, mut problems, mut problem_count } = log;
+        let mut unknown: Vec<u32> = Vec::new();
+        let mut writer = Writer::new(params);
+        let last_truth = entries.iter().rposition(|entry| matches!(entry.record, Record::Truth(_)));
+        let mut play = Vec::with_capacity(entries.len());
+        for (index, entry) in entries.into_iter().enumerate() {
+            let at_s = params.start_delay_s + entry.at_s / params.speed;
+            let message = writer.write(entry, last_truth == Some(index), &mut unknown);
+            // A time beyond any clock cannot become a duration; such an entry never comes.
+            if let Ok(at) = Duration::try_from_secs_f64(at_s) {
+                play.push((at, message));
+            }
+        }
+        for id in unknown {
+            problem_count += 1;
+            problems.push(Problem { line: 0, fault: Fault::UnknownAnchor { id } });
+        }
+        Ok(Self { due: Vec::new(), play, next: 0, begun: None, problems, problem_count })
+    }
+
+    /// What is due since the last step, in order. The play begins with the first step.
+    pub fn step(&mut self, now: Time) -> &[Due] {
+        let begun = *self.begun.get_or_insert(now);
+        self.due.clear();
+        while let Some((at, message)) = self.play.get_mut(self.next)
+            && begun.after(*at) <= now
+        {
+            // Each message is played once; what it holds moves on.
+            self.due.push(std::mem::replace(message, Due::Truth(TruePose::default())));
+            self.next += 1;
+        }
+        &self.due
+    }
+
+    /// Whether everything was played.
+    pub fn is_finished(&self) -> bool {
+        self.next == self.play.len()
+    }
+
+    /// How long the play takes in all.
+    pub fn length(&self) -> Duration {
+        self.play.last().map_or(Duration::ZERO, |(at, _)| *at)
+    }
+
+    /// What of the log could not be played, the first of it.
+    pub fn problems(&self) -> &[Problem] {
+        &self.problems
+    }
+
+    /// How much of the log could not be played.
+    pub fn problem_count(&self) -> usize {
+        self.problem_count
+    }
+}
+
+/// Turns records into messages.
+struct Writer<'a> {
+    params: &'a Params,
+    last: Option<(f64, Pose2)>,
+    left_travel_m: f64,
+    right_travel_m: f64,
+}
+
+impl<'a> Writer<'a> {
+    fn new(params: &'a Params) -> Self {
+        Self { params, last: None, left_travel_m: 0.0, right_travel_m: 0.0 }
+    }
+
+    fn write(&mut self, entry: Entry, is_last: bool, unknown: &mut Vec<u32>) -> Due {
+        match entry.record {
+            Record::Odometry(pose) => Due::Odometry(self.odometry(entry.at_s, pose)),
+            Record::Ranges { antenna_m, heard } => Due::Tag(Box::new(self.tag(antenna_m, &heard, unknown))),
+            Record::Scan { sensor, angle_min_rad, angle_step_rad, ranges_m } => {
+                let header = RangeScan {
+                    sensor_x_m: sensor.x_m,
+                    sensor_y_m: sensor.y_m,
+                    sensor_heading_rad: sensor.heading_rad,
+                    angle_min_rad,
+                    angle_step_rad,
+                    range_max_m: self.params.range_max_m,
+                };
+                Due::Scan(header, ranges_m)
+            }
+            Record::Truth(pose) => Due::Truth(TruePose {
+                x_m: pose.x_m,
+                y_m: pose.y_m,
+                heading_rad: pose.heading_rad,
+                floor: 0,
+                is_last: u32::from(is_last),
+            }),
+        }
+    }
+
+    /// Speeds and the wheels' paths are made up from the change of the pose, in the time of the log.
+    fn odometry(&mut self, at_s: f64, pose: Pose2) -> Odometry {
+        let (last_s, last) = self.last.replace((at_s, pose)).unwrap_or((at_s, pose));
+        let motion = last.to(pose);
+        let path_m = motion.x_m.hypot(motion.y_m).copysign(motion.x_m);
+        let half_m = 0.5 * self.params.wheel_track_m * motion.heading_rad;
+        self.left_travel_m += path_m - half_m;
+        self.right_travel_m += path_m + half_m;
+        let passed_s = at_s - last_s;
+        let per_second = |change: f64| if passed_s > 0.0 { change / passed_s } else { 0.0 };
+        Odometry {
+            x_m: pose.x_m,
+            y_m: pose.y_m,
+            heading_rad: pose.heading_rad,
+            forward_mps: per_second(path_m),
+            turn_rad_per_s: per_second(motion.heading_rad),
+            left_travel_m: self.left_travel_m,
+            right_travel_m: self.right_travel_m,
+        }
+    }
+
+    fn tag(&self, antenna_m: [f64; 3], heard: &[(u32, f64)], unknown: &mut Vec<u32>) -> TagRanges {
+        let mut tag = TagRanges {
+            antenna_x_m: antenna_m[0],
+            antenna_y_m: antenna_m[1],
+            antenna_z_m: antenna_m[2],
+            ..TagRanges::default()
+        };
+        for &(id, range_m) in heard {
+            let Some([x_m, y_m, z_m]) = self.params.anchor_in_map(id) else {
+                if !unknown.contains(&id) && unknown.len() < PROBLEM_LIMIT {
+                    unknown.push(id);
+                }
+                continue;
+            };
+            let index = tag.anchor_count as usize;
+            if index < ANCHOR_CAPACITY {
+                tag.anchors[index] = AnchorRange { x_m, y_m, z_m, range_m, id, quality_percent: 100.0 };
+                tag.anchor_count += 1;
+            }
+        }
+        tag
+    }
+}

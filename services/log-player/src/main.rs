@@ -1,0 +1,28 @@
+//! The process around `log_player`.
+use log_player::{Due, LogPlayer, Params, load};
+use messages::{Odometry, RangeScan, TagRanges, TruePose};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    board::run(board::about!(), |node, params: Params| {
+        let mut odometry = node.publisher::<Odometry>("wheels/odometry")?;
+        let mut tag = node.publisher::<TagRanges>("tag/ranges")?;
+        let mut scan = node.publisher::<RangeScan>("laser/scan")?;
+        let mut truth = node.publisher::<TruePose>("truth/pose")?;
+        node.every(params.tick());
+        let mut player = LogPlayer::new(&params, load(&params)?)?;
+        for problem in player.problems() {
+            tracing::warn!(file = params.file, "{problem}");
+        }
+        Ok(move |now| {
+            for due in player.step(now) {
+                match due {
+                    Due::Odometry(message) => odometry.publish(message),
+                    Due::Tag(message) => tag.publish(message),
+                    Due::Scan(header, ranges_m) => scan.publish_with(header, ranges_m),
+                    Due::Truth(message) => truth.publish(message),
+                }
+            }
+        })
+    })
+}

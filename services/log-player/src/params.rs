@@ -1,0 +1,208 @@
+//! The parameters of `log-player`.
+
+use geometry::{Point2, Pose2};
+use messages::{ANCHOR_CAPACITY, Parameters};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How a log is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Format {
+    /// Lines `ODOM step dx dy dphi`, `LASER step ..`, `BEACON step id range ..`: MRPT's action-observation pairs as text.
+    #[default]
+    Steps,
+    /// CARMEN's `ODOM x y theta ..` and `FLASER n r1 .. rn x y theta ..`.
+    Carmen,
+}
+
+/// Where the time of a message comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Timing {
+    /// From the log's time stamps where they are of use, from the order of its lines where not.
+    #[default]
+    Auto,
+    /// From the log's time stamps.
+    Recorded,
+    /// From the order in the log: `period_s` from one to the next.
+    Order,
+}
+
+/// What `log-player` can be told.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Params {
+    /// The log, as text or compressed by gzip; empty plays nothing.
+    pub file: String,
+    /// How the log is written.
+    pub format: Format,
+    /// True poses beside the log, lines `row x y heading`; empty for none, or when the log holds them itself.
+    pub truth: String,
+    /// Row k of the true poses belongs to step k plus this.
+    #[schemars(range(min = 0, max = 1000))]
+    pub truth_step_offset: u32,
+    /// How many times faster than it was recorded.
+    #[schemars(range(min = 0.001, max = 100000.0))]
+    pub speed: f64,
+    /// Where the times of a CARMEN log come from.
+    pub timing: Timing,
+    /// Time from one step of a log without time stamps to the next, at speed 1.
+    #[schemars(range(min = 0.001, max = 3600.0))]
+    pub period_s: f64,
+    /// Wait after the start, on the board's clock, so that readers are there for the first message.
+    #[schemars(range(min = 0.0, max = 60.0))]
+    pub start_delay_s: f64,
+    /// How often it is looked what is due.
+    #[schemars(range(min = 0.1, max = 1000.0))]
+    pub tick_ms: f64,
+    /// Laser ranges from here on mean "nothing seen".
+    #[schemars(range(min = 0.1, max = 1000.0))]
+    pub range_max_m: f64,
+    /// Distance between the wheels, from which their paths are made up.
+    #[schemars(range(min = 0.01, max = 10.0))]
+    pub wheel_track_m: f64,
+    /// The radio anchors, in their own frame.
+    pub anchors: Vec<AnchorPlace>,
+    /// Pose of the map's frame in the anchors' frame. The map's frame is that of the true poses.
+    pub map_in_anchor_frame: Pose,
+}
+
+/// Where an anchor hangs, in the anchors' frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AnchorPlace {
+    /// Its number in the log.
+    pub id: u32,
+    /// Place.
+    pub x_m: f64,
+    /// Place.
+    pub y_m: f64,
+    /// Height above the floor.
+    pub z_m: f64,
+}
+
+/// A pose in a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Pose {
+    /// Place.
+    pub x_m: f64,
+    /// Place.
+    pub y_m: f64,
+    /// Direction.
+    pub heading_rad: f64,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            file: String::new(),
+            format: Format::Steps,
+            truth: String::new(),
+            truth_step_offset: 1,
+            speed: 1.0,
+            timing: Timing::Auto,
+            period_s: 1.05,
+            start_delay_s: 0.5,
+            tick_ms: 5.0,
+            range_max_m: 80.0,
+            wheel_track_m: 0.40,
+            anchors: Vec::new(),
+            map_in_anchor_frame: Pose::default(),
+        }
+    }
+}
+
+impl Params {
+    /// How often it is looked what is due.
+    pub fn tick(&self) -> std::time::Duration {
+        std::time::Duration::from_secs_f64(self.tick_ms.clamp(0.1, 1000.0) * 1e-3)
+    }
+
+    /// An anchor in the map.
+    pub fn anchor_in_map(&self, id: u32) -> Option<[f64; 3]> {
+        let anchor = self.anchors.iter().find(|anchor| anchor.id == id)?;
+        let frame = self.map_in_anchor_frame;
+        let frame = Pose2::new(frame.x_m, frame.y_m, frame.heading_rad);
+        let place = frame.inverse_transform(Point2::new(anchor.x_m, anchor.y_m));
+        Some([place.x, place.y, anchor.z_m])
+    }
+}
+
+/// Parameters that make no sense.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ParamsError {
+    /// A number outside of its range.
+    #[error("{name} = {value} must lie between {least} and {most}")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The smallest value allowed.
+        least: f64,
+        /// The largest value allowed.
+        most: f64,
+    },
+    /// Two anchors with one number.
+    #[error("anchors: number {id} occurs twice; give each anchor its own")]
+    AnchorTwice {
+        /// The number.
+        id: u32,
+    },
+    /// More anchors than a message holds.
+    #[error("anchors: {count} are more than the {ANCHOR_CAPACITY} that a message holds")]
+    TooManyAnchors {
+        /// How many there are.
+        count: usize,
+    },
+    /// True poses without a log.
+    #[error("truth = {truth:?} without a file; name the log that it belongs to")]
+    TruthWithoutLog {
+        /// The file of true poses.
+        truth: String,
+    },
+}
+
+impl Parameters for Params {
+    type Error = ParamsError;
+
+    fn check(&self) -> Result<(), ParamsError> {
+        let frame = self.map_in_anchor_frame;
+        let mut numbers = vec![
+            ("truth_step_offset", f64::from(self.truth_step_offset), 0.0, 1000.0),
+            ("speed", self.speed, 0.001, 100_000.0),
+            ("period_s", self.period_s, 0.001, 3600.0),
+            ("start_delay_s", self.start_delay_s, 0.0, 60.0),
+            ("tick_ms", self.tick_ms, 0.1, 1000.0),
+            ("range_max_m", self.range_max_m, 0.1, 1000.0),
+            ("wheel_track_m", self.wheel_track_m, 0.01, 10.0),
+            ("map_in_anchor_frame.x_m", frame.x_m, -1e6, 1e6),
+            ("map_in_anchor_frame.y_m", frame.y_m, -1e6, 1e6),
+            ("map_in_anchor_frame.heading_rad", frame.heading_rad, -10.0, 10.0),
+        ];
+        for anchor in &self.anchors {
+            numbers.push(("anchors.x_m", anchor.x_m, -1e6, 1e6));
+            numbers.push(("anchors.y_m", anchor.y_m, -1e6, 1e6));
+            numbers.push(("anchors.z_m", anchor.z_m, -1e3, 1e3));
+        }
+        for (name, value, least, most) in numbers {
+            if !(value >= least && value <= most) {
+                return Err(ParamsError::OutOfRange { name, value, least, most });
+            }
+        }
+        if self.anchors.len() > ANCHOR_CAPACITY {
+            return Err(ParamsError::TooManyAnchors { count: self.anchors.len() });
+        }
+        for (index, anchor) in self.anchors.iter().enumerate() {
+            if self.anchors[..index].iter().any(|earlier| earlier.id == anchor.id) {
+                return Err(ParamsError::AnchorTwice { id: anchor.id });
+            }
+        }
+        if self.file.is_empty() && !self.truth.is_empty() {
+            return Err(ParamsError::TruthWithoutLog { truth: self.truth.clone() });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,149 @@
+//! The parameters of the simulator.
+
+use geometry::WorldError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// The parameters of the simulator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Params {
+    /// The world file, relative to the working directory; empty for an empty plane.
+    pub world: String,
+    /// Which of the file's starts is the robot's.
+    pub robot: String,
+    /// The fixed step of the simulation; the truth is published after each.
+    #[schemars(range(min = 1, max = 50))]
+    pub period_ms: u32,
+    /// Distance between the middles of the two driven wheels.
+    #[schemars(range(min = 0.05, max = 2.0))]
+    pub wheel_track_m: f64,
+    /// The left motor turns so many times faster than it is told (COF-012).
+    #[schemars(range(min = 0.5, max = 1.5))]
+    pub left_gain: f64,
+    /// The right motor turns so many times faster than it is told: it is of another kind (COF-012).
+    #[schemars(range(min = 0.5, max = 1.5))]
+    pub right_gain: f64,
+    /// A motor changes its wheel's speed no faster than this, up and down.
+    #[schemars(range(min = 0.05, max = 20.0))]
+    pub wheel_acceleration_m_per_s2: f64,
+    /// The share of a wheel's turn that is lost to slip.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub slip_fraction: f64,
+    /// Standard deviation of a wheel's way over ground after one metre; it grows with the root of the way.
+    #[schemars(range(min = 0.0, max = 0.1))]
+    pub way_noise_m: f64,
+    /// The motor controller stops the wheels when `wheels/applied` is older.
+    #[schemars(range(min = 10, max = 1000))]
+    pub watchdog_ms: u32,
+    /// Length of the robot's body (COF-003).
+    #[schemars(range(min = 0.05, max = 2.0))]
+    pub body_length_m: f64,
+    /// Width of the robot's body (COF-003).
+    #[schemars(range(min = 0.05, max = 2.0))]
+    pub body_width_m: f64,
+    /// Height of the robot's body: what is higher up cannot be touched.
+    #[schemars(range(min = 0.05, max = 3.0))]
+    pub body_height_m: f64,
+    /// Whether people wait for the robot instead of walking into it.
+    pub walkers_wait: bool,
+    /// At this distance from the robot's body they wait.
+    #[schemars(range(min = 0.05, max = 3.0))]
+    pub walkers_wait_m: f64,
+    /// After so long in front of a robot at rest they squeeze past it, without touching it.
+    #[schemars(range(min = 0.0, max = 60.0))]
+    pub walkers_patience_s: f64,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            world: String::new(),
+            robot: "coffee".to_owned(),
+            period_ms: 10,
+            wheel_track_m: 0.40,
+            left_gain: 1.0,
+            right_gain: 0.97,
+            wheel_acceleration_m_per_s2: 0.8,
+            slip_fraction: 0.01,
+            way_noise_m: 0.004,
+            watchdog_ms: 100,
+            body_length_m: 0.61,
+            body_width_m: 0.51,
+            body_height_m: 1.0,
+            walkers_wait: true,
+            walkers_wait_m: 0.4,
+            walkers_patience_s: 3.0,
+        }
+    }
+}
+
+/// Why parameters of the simulator are refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ParamsError {
+    /// A number outside of what is possible.
+    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Smallest possible value.
+        min: f64,
+        /// Largest possible value.
+        max: f64,
+    },
+    /// The world file cannot be used.
+    #[error("world: {0}")]
+    World(#[from] WorldError),
+    /// The world has no place for the robot to begin.
+    #[error(
+        "the world {world:?} has no [[start]] for robot {robot:?}; add one, or name a robot that it knows"
+    )]
+    NoStart {
+        /// The world file.
+        world: String,
+        /// The robot.
+        robot: String,
+    },
+    /// The robot begins inside something.
+    #[error("the start of robot {robot:?} in {world:?} lies in a wall or a body; move it")]
+    StartBlocked {
+        /// The world file.
+        world: String,
+        /// The robot.
+        robot: String,
+    },
+}
+
+impl Params {
+    /// The fixed step.
+    pub fn period(&self) -> Duration {
+        Duration::from_millis(self.period_ms.into())
+    }
+}
+
+impl messages::Parameters for Params {
+    type Error = ParamsError;
+
+    fn check(&self) -> Result<(), ParamsError> {
+        within("period_ms", self.period_ms.into(), 1.0, 50.0)?;
+        within("wheel_track_m", self.wheel_track_m, 0.05, 2.0)?;
+        within("left_gain", self.left_gain, 0.5, 1.5)?;
+        within("right_gain", self.right_gain, 0.5, 1.5)?;
+        within("wheel_acceleration_m_per_s2", self.wheel_acceleration_m_per_s2, 0.05, 20.0)?;
+        within("slip_fraction", self.slip_fraction, 0.0, 0.5)?;
+        within("way_noise_m", self.way_noise_m, 0.0, 0.1)?;
+        within("watchdog_ms", self.watchdog_ms.into(), 10.0, 1000.0)?;
+        within("body_length_m", self.body_length_m, 0.05, 2.0)?;
+        within("body_width_m", self.body_width_m, 0.05, 2.0)?;
+        within("body_height_m", self.body_height_m, 0.05, 3.0)?;
+        within("walkers_wait_m", self.walkers_wait_m, 0.05, 3.0)?;
+        within("walkers_patience_s", self.walkers_patience_s, 0.0, 60.0)
+    }
+}
+
+fn within(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), ParamsError> {
+    if (min..=max).contains(&value) { Ok(()) } else { Err(ParamsError::OutOfRange { name, value, min, max }) }
+}

@@ -1,0 +1,204 @@
+//! The arrows of the house, held: who may know whom. ARCHITECTURE.md says why.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests lie in the workspace").to_owned()
+}
+
+fn folders(path: &Path) -> Vec<PathBuf> {
+    let mut folders: Vec<PathBuf> =
+        fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()).filter(|path| path.is_dir()).collect();
+    folders.sort();
+    folders
+}
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).into_iter().flatten() {
+        let path = entry.unwrap().path();
+        if path.is_dir() && path.file_name().is_some_and(|name| name != "target") {
+            found.extend(sources(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+fn manifest(folder: &Path) -> toml::Table {
+    fs::read_to_string(folder.join("Cargo.toml")).unwrap().parse().unwrap()
+}
+
+fn dependencies(folder: &Path) -> Vec<String> {
+    let manifest = manifest(folder);
+    let names = |section: &str| {
+        manifest
+            .get(section)
+            .and_then(|value| value.as_table())
+            .into_iter()
+            .flat_map(|table| table.keys().cloned())
+    };
+    names("dependencies").chain(names("dev-dependencies")).chain(names("build-dependencies")).collect()
+}
+
+fn name(folder: &Path) -> String {
+    folder.file_name().unwrap().to_string_lossy().into_owned()
+}
+
+/// Lines of code, without comments, that contain the word as a whole.
+fn mentions(file: &Path, word: &str) -> Vec<usize> {
+    let text = fs::read_to_string(file).unwrap();
+    let is_word = |byte: Option<u8>| byte.is_some_and(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+    text.lines()
+        .enumerate()
+        .filter(|(_, line)| {
+            let code = line.split("//").next().unwrap_or_default();
+            code.match_indices(word).any(|(at, _)| {
+                let before = at.checked_sub(1).map(|index| code.as_bytes()[index]);
+                !is_word(before) && !is_word(code.as_bytes().get(at + word.len()).copied())
+            })
+        })
+        .map(|(index, _)| index + 1)
+        .collect()
+}
+
+#[test]
+fn the_core_of_a_service_never_names_the_board() {
+    for service in folders(&root().join("services")) {
+        for file in sources(&service.join("src")) {
+            if file.file_name().is_some_and(|name| name == "main.rs") {
+                continue;
+            }
+            let lines = mentions(&file, "board");
+            let paths: Vec<usize> = lines
+                .into_iter()
+                .filter(|line| {
+                    let text = fs::read_to_string(&file).unwrap();
+                    let code = text.lines().nth(line - 1).unwrap_or_default().to_owned();
+                    code.contains("board::") || code.contains("use board")
+                })
+                .collect();
+            assert!(paths.is_empty(), "{} names the board in lines {paths:?}", file.display());
+        }
+    }
+}
+
+#[test]
+fn no_service_depends_on_another() {
+    let services: Vec<PathBuf> = folders(&root().join("services"));
+    let names: Vec<String> = services.iter().map(|service| name(service)).collect();
+    assert!(names.len() >= 10, "the house has services: {names:?}");
+    for service in &services {
+        for dependency in dependencies(service) {
+            assert!(!names.contains(&dependency), "{} depends on the service {dependency}", name(service));
+        }
+    }
+}
+
+#[test]
+fn the_launcher_depends_on_no_service() {
+    let names: Vec<String> = folders(&root().join("services")).iter().map(|service| name(service)).collect();
+    for dependency in dependencies(&root().join("launch")) {
+        assert!(!names.contains(&dependency), "launch depends on the service {dependency}");
+    }
+}
+
+#[test]
+fn schemas_know_neither_board_nor_services() {
+    for (crate_name, allowed) in [("geometry", &[][..]), ("messages", &["geometry", "messages-derive"][..])] {
+        let inside = ["board", "launch", "tests", "geometry", "messages", "messages-derive"];
+        for dependency in dependencies(&root().join("schemas").join(crate_name)) {
+            let ours = inside.contains(&dependency.as_str());
+            assert!(!ours || allowed.contains(&dependency.as_str()), "{crate_name} depends on {dependency}");
+        }
+    }
+}
+
+#[test]
+fn only_the_board_knows_the_transport() {
+    let root = root();
+    for folder in ["services", "schemas", "launch", "tests"] {
+        for file in sources(&root.join(folder)) {
+            if file.ends_with("tidy.rs") {
+                continue;
+            }
+            assert_eq!(mentions(&file, "iceoryx2"), Vec::<usize>::new(), "{}", file.display());
+        }
+    }
+    for file in sources(&root.join("board/src")) {
+        if !file.ends_with("transport.rs") {
+            assert_eq!(mentions(&file, "iceoryx2"), Vec::<usize>::new(), "{}", file.display());
+        }
+    }
+}
+
+#[test]
+fn glam_appears_in_geometry_only() {
+    let root = root();
+    for folder in ["services", "board", "schemas/messages", "launch", "tests"] {
+        for file in sources(&root.join(folder)) {
+            if file.ends_with("tidy.rs") {
+                continue;
+            }
+            for word in ["glam", "glamx", "parry2d", "parry2d_f64"] {
+                assert_eq!(mentions(&file, word), Vec::<usize>::new(), "{}", file.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn every_crate_obeys_the_one_lint_table() {
+    let root = root();
+    let mut crates = folders(&root.join("services"));
+    crates.extend(
+        ["board", "launch", "tests", "schemas/geometry", "schemas/messages", "schemas/messages/derive"]
+            .map(|name| root.join(name)),
+    );
+    for folder in crates {
+        let workspace = manifest(&folder)
+            .get("lints")
+            .and_then(|lints| lints.get("workspace"))
+            .and_then(|value| value.as_bool());
+        assert_eq!(workspace, Some(true), "{} has lints of its own", folder.display());
+    }
+}
+
+#[test]
+fn a_service_is_named_after_its_folder() {
+    for service in folders(&root().join("services")) {
+        let manifest = manifest(&service);
+        assert_eq!(manifest["package"]["name"].as_str(), Some(name(&service).as_str()));
+        for file in ["src/lib.rs", "src/params.rs", "src/main.rs"] {
+            assert!(service.join(file).exists(), "{} has no {file}", name(&service));
+        }
+    }
+}
+
+#[test]
+fn the_top_level_is_the_agreed_one() {
+    let allowed = [
+        "Cargo.toml",
+        "Cargo.lock",
+        "README.md",
+        "ARCHITECTURE.md",
+        "CHANGELOG.md",
+        "LICENSE-APACHE",
+        "LICENSE-MIT",
+        "board",
+        "clippy.toml",
+        "launch",
+        "rustfmt.toml",
+        "schemas",
+        "services",
+        "tests",
+        "target",
+    ];
+    for entry in fs::read_dir(root()).unwrap() {
+        let name = entry.unwrap().file_name().to_string_lossy().into_owned();
+        assert!(name.starts_with('.') || allowed.contains(&name.as_str()), "{name} at the top level");
+    }
+}
