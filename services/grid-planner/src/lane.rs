@@ -8,7 +8,7 @@ const FAR: u16 = 4000;
 /// A passage is a hallway where it is this much longer than wide.
 const SLENDER: f64 = 2.0;
 /// So near to the lane's middle is in the lane, in metres.
-const TOLERANCE_M: f64 = 0.03;
+const TOLERANCE_M: f64 = 0.01;
 
 /// For each cell and each direction of travel: how far beside the lane it lies, in metres; zero outside hallways and for travel across
 /// one. The lane's middle is `lane_m` from the wall on the right of the traveller, or the hallway's middle where that is nearer. A
