@@ -28,7 +28,8 @@ pub(crate) fn finish(outcome: Outcome) -> ExitCode {
 
 /// Clears away boards whose launcher is gone, and says so.
 pub(crate) fn sweep() -> Outcome {
-    let swept = host::sweep().map_err(|error| format!("what is left of a board cannot be cleared away: {error}"))?;
+    let swept =
+        host::sweep().map_err(|error| format!("what is left of a board cannot be cleared away: {error}"))?;
     for board in swept {
         eprintln!("{}", crate::summary::swept(&board));
     }
@@ -179,8 +180,20 @@ fn table(status: &Status) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
     table.set_header(vec![
-        "SERVICE", "BINARY", "STATE", "PID", "RESTARTS", "HZ", "CPU %", "MEM KiB", "STEP p50 us", "p99 us", "max us", "LATE",
-        "LOST", "INVALID",
+        "SERVICE",
+        "BINARY",
+        "STATE",
+        "PID",
+        "RESTARTS",
+        "HZ",
+        "CPU %",
+        "MEM KiB",
+        "STEP p50 us",
+        "p99 us",
+        "max us",
+        "LATE",
+        "LOST",
+        "INVALID",
     ]);
     for service in &status.services {
         let numbers = [

@@ -78,7 +78,12 @@ pub(crate) struct EventLine {
 
 impl From<&Event> for EventLine {
     fn from(event: &Event) -> Self {
-        Self { at_s: event.at_s, role: event.role.clone(), text: event.text.clone(), is_trouble: event.is_trouble }
+        Self {
+            at_s: event.at_s,
+            role: event.role.clone(),
+            text: event.text.clone(),
+            is_trouble: event.is_trouble,
+        }
     }
 }
 
@@ -192,7 +197,9 @@ pub(crate) fn choose(name: Option<&str>) -> Result<Place, String> {
     match name {
         Some(name) => match running.iter().position(|place| place.name() == name) {
             Some(index) => Ok(running.swap_remove(index)),
-            None if running.is_empty() => Err(format!("no board `{name}` is up, and no other; start one with `launch up {name}`")),
+            None if running.is_empty() => {
+                Err(format!("no board `{name}` is up, and no other; start one with `launch up {name}`"))
+            }
             None => Err(format!("no board `{name}` is up; there is {}", names())),
         },
         None => match running.len() {

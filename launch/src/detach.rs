@@ -15,7 +15,9 @@ use std::time::Duration;
 pub(crate) fn detach(board: &str) -> Result<(), String> {
     let place = Place::new(board).map_err(|error| error.to_string())?;
     if let Some(pid) = host::living_launcher(&place) {
-        return Err(format!("the board `{board}` is up already (launcher {pid}); stop it with `launch stop --board {board}`"));
+        return Err(format!(
+            "the board `{board}` is up already (launcher {pid}); stop it with `launch stop --board {board}`"
+        ));
     }
     let output = std::env::temp_dir().join(format!("corkboard-{}.start", std::process::id()));
     let file = std::fs::File::create(&output).map_err(|error| format!("{}: {error}", output.display()))?;
@@ -46,7 +48,10 @@ pub(crate) fn detach(board: &str) -> Result<(), String> {
     };
     let _ = std::fs::remove_file(&output);
     if ready.is_ok() {
-        println!("the board `{board}` is up (launcher {}); `launch ps`, `launch logs`, `launch stop`", child.id());
+        println!(
+            "the board `{board}` is up (launcher {}); `launch ps`, `launch logs`, `launch stop`",
+            child.id()
+        );
     }
     ready
 }

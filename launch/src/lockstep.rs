@@ -61,7 +61,8 @@ pub(crate) fn run(
     set.set(cpu);
     rustix::thread::sched_setaffinity(None, &set)?;
     let mut supervisor = Supervisor::new(&graph, board, options.logs.as_deref(), true)?;
-    let observer = Tap::join(supervisor.host.place().clone(), "observer").and_then(|tap| Observer::new(tap, graph.finish.as_deref()));
+    let observer = Tap::join(supervisor.host.place().clone(), "observer")
+        .and_then(|tap| Observer::new(tap, graph.finish.as_deref()));
     let mut observer = match observer {
         Ok(observer) => observer,
         Err(error) => {
@@ -75,7 +76,10 @@ pub(crate) fn run(
         .and_then(|mut monitor| play(&mut supervisor, &mut monitor, &mut observer, pace, signals, display));
     display.close();
     if let Err(error) = &outcome {
-        let role = supervisor.services.iter().find(|service| error.to_string().contains(&format!("`{}`", service.service.role)));
+        let role = supervisor
+            .services
+            .iter()
+            .find(|service| error.to_string().contains(&format!("`{}`", service.service.role)));
         if let Some(service) = role {
             let role = service.service.role.clone();
             eprintln!("the last lines of the log of `{role}`:");
@@ -87,7 +91,10 @@ pub(crate) fn run(
     outcome
 }
 
-fn wait_until_ready(supervisor: &mut Supervisor, signals: &Signals) -> Result<(), Box<dyn std::error::Error>> {
+fn wait_until_ready(
+    supervisor: &mut Supervisor,
+    signals: &Signals,
+) -> Result<(), Box<dyn std::error::Error>> {
     while !supervisor.all_ready() {
         supervisor.tick();
         if let Some(failed) = supervisor.failed() {
@@ -128,7 +135,9 @@ fn play(
             match conductor.play_instant(&supervisor.host, &mut |_, _| observer.look(), &mut lives) {
                 Ok(()) => {}
                 // Everything has been said: a run without a referee ends so.
-                Err(Discord::Over { .. }) if supervisor.services.iter().any(|service| service.phase == Phase::Finished) => {
+                Err(Discord::Over { .. })
+                    if supervisor.services.iter().any(|service| service.phase == Phase::Finished) =>
+                {
                     return Ok(outcome(&conductor, observer, began, false));
                 }
                 Err(discord) => return Err(discord.into()),
@@ -205,7 +214,8 @@ fn as_text(outcome: &Outcome) -> String {
 }
 
 fn as_json(outcome: &Outcome) -> String {
-    let run = outcome.summary.as_ref().map(|word| summary::json(word, 0)).unwrap_or_else(|| "null".to_owned());
+    let run =
+        outcome.summary.as_ref().map(|word| summary::json(word, 0)).unwrap_or_else(|| "null".to_owned());
     let run: serde_json::Value = serde_json::from_str(&run).unwrap_or_default();
     let value = serde_json::json!({
         "run": run,

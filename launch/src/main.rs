@@ -13,9 +13,11 @@ mod plain;
 mod summary;
 mod supervise;
 mod up;
+mod view;
 
 use clap::Parser as _;
 use cli::{Cli, Command, UpArgs};
+use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -42,16 +44,21 @@ fn main() -> ExitCode {
 }
 
 fn up_command(args: &UpArgs) -> ExitCode {
-    let Some(graph) = graph::prepare(&args.which.request(args.board.as_deref())) else { return ExitCode::FAILURE };
+    let Some(graph) = graph::prepare(&args.which.request(args.board.as_deref())) else {
+        return ExitCode::FAILURE;
+    };
     if args.detach {
         return commands::finish(detach::detach(args.board.as_deref().unwrap_or(&graph.name)));
     }
-    let options =
-        up::Options { board: args.board.clone(), logs: args.log_dir.clone(), json: args.json };
-    let mut display = plain::Lines::new(args.no_view);
+    let options = up::Options { board: args.board.clone(), logs: args.log_dir.clone(), json: args.json };
+    let mut lines = plain::Lines::new(args.no_view);
     if args.lockstep {
         let pace = lockstep::Pace { speed: args.speed, until_s: args.until, cpu: args.cpu };
-        return lockstep::up(&graph, &options, &pace, &mut display);
+        return lockstep::up(&graph, &options, &pace, &mut lines);
     }
-    up::up(&graph, &options, &mut display)
+    let on_terminal = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
+    if on_terminal && !args.plain && !args.no_view {
+        return up::up(&graph, &options, &mut view::Live::new(&graph));
+    }
+    up::up(&graph, &options, &mut lines)
 }

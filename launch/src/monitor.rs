@@ -117,7 +117,11 @@ impl Monitor {
             graph: graph.display().to_string(),
             launcher_pid: std::process::id(),
             uptime_s: clock::monotonic().seconds_since(supervisor.began),
-            logs: supervisor.log_file("x").parent().map(|path| path.display().to_string()).unwrap_or_default(),
+            logs: supervisor
+                .log_file("x")
+                .parent()
+                .map(|path| path.display().to_string())
+                .unwrap_or_default(),
             services: services.collect(),
             events: supervisor.events.iter().map(Into::into).collect(),
         }

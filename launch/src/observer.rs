@@ -61,7 +61,8 @@ impl Observer {
                 head[24..].copy_from_slice(&envelope.round.to_le_bytes());
                 watched.hasher.update(&head).update(bytes);
                 if self.finish.as_ref() == Some(&watched.topic) {
-                    self.summary = View::<RunSummary>::parse(bytes).ok().map(|view| *view.message).or(self.summary);
+                    self.summary =
+                        View::<RunSummary>::parse(bytes).ok().map(|view| *view.message).or(self.summary);
                 }
             }
         }
@@ -96,4 +97,3 @@ impl Observer {
 fn short(hash: &blake3::Hash) -> String {
     hash.to_hex().chars().take(32).collect()
 }
-

@@ -37,12 +37,16 @@ pub(crate) fn json(word: &RunSummary, restarts: u32) -> String {
         .collect();
     let passed = matches!(word.state.get(), Ok(RunState::Passed));
     let remark = word.remark.as_str();
-    format!("{}\n", serde_json::json!({"passed": passed, "remark": remark, "figures": figures, "restarts": restarts}))
+    format!(
+        "{}\n",
+        serde_json::json!({"passed": passed, "remark": remark, "figures": figures, "restarts": restarts})
+    )
 }
 
 /// What was found of a run that had not cleaned up.
 pub(crate) fn swept(swept: &Swept) -> String {
-    let mut text = format!("cleared away what was left of the board `{}`: {} files", swept.board, swept.files);
+    let mut text =
+        format!("cleared away what was left of the board `{}`: {} files", swept.board, swept.files);
     if !swept.ended.is_empty() {
         let names: Vec<&str> = swept.ended.iter().map(|(role, _)| role.as_str()).collect();
         let _ = write!(text, ", and ended {}", names.join(", "));

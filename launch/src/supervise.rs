@@ -1,7 +1,7 @@
 //! Starts the services, sees at once when one dies or hangs, cleans up after it, and starts it again.
 
-use crate::graph::{Checked, CheckedService, Publisher};
 use crate::graph::Priority;
+use crate::graph::{Checked, CheckedService, Publisher};
 use board::host::{self, Host, HostError};
 use board::manifest::{Manifest, Topic};
 use board::switchboard::SlotState;
@@ -198,7 +198,9 @@ impl Supervisor {
 
     /// Ends a service and starts it again; `false` when there is none of that name.
     pub(crate) fn restart(&mut self, role: &str) -> bool {
-        let Some(index) = self.services.iter().position(|service| service.service.role == role) else { return false };
+        let Some(index) = self.services.iter().position(|service| service.service.role == role) else {
+            return false;
+        };
         self.note(role, "restart asked for", false);
         let service = &mut self.services[index];
         service.failures = 0;
@@ -239,8 +241,8 @@ impl Supervisor {
             let _ = cleaner.wait();
         }
         let driver = self.host.manifest().topic(WHEELS).and_then(|(_, topic)| topic.publisher.clone());
-        let (first, rest): (Vec<usize>, Vec<usize>) =
-            (0..self.services.len()).partition(|&index| Some(&self.services[index].service.role) == driver.as_ref());
+        let (first, rest): (Vec<usize>, Vec<usize>) = (0..self.services.len())
+            .partition(|&index| Some(&self.services[index].service.role) == driver.as_ref());
         self.end(&first, hurry);
         self.end(&rest, hurry);
         self.host.take_down()
@@ -265,7 +267,8 @@ impl Supervisor {
                     service.process = None;
                     continue;
                 }
-                let limit = if hurry() { Duration::from_millis(50) } else { service.service.launch.stop_after };
+                let limit =
+                    if hurry() { Duration::from_millis(50) } else { service.service.launch.stop_after };
                 if now.since(asked) > limit {
                     let _ = process.child.kill();
                 }
@@ -346,7 +349,9 @@ impl Supervisor {
     }
 
     fn note_ready(&mut self, index: usize, now: Time) {
-        let Some(slot) = self.services[index].slot.and_then(|slot| self.host.switchboard().slot(slot)) else { return };
+        let Some(slot) = self.services[index].slot.and_then(|slot| self.host.switchboard().slot(slot)) else {
+            return;
+        };
         let joined = slot.state() == SlotState::Running;
         let service = &mut self.services[index];
         let Some(process) = &mut service.process else { return };
@@ -409,7 +414,11 @@ impl Supervisor {
             Ok(pause) => {
                 service.phase = Phase::Waiting;
                 service.restart_at = Some(now.after(pause));
-                let when = if pause.is_zero() { "at once".to_owned() } else { format!("in {} ms", pause.as_millis()) };
+                let when = if pause.is_zero() {
+                    "at once".to_owned()
+                } else {
+                    format!("in {} ms", pause.as_millis())
+                };
                 self.note(&role, format!("{how}; starting it again {when}"), true);
             }
             Err(why) => {

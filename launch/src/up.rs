@@ -94,7 +94,10 @@ fn run(
         logs.iter().for_each(|line| eprintln!("  {line}"));
     }
     if let Some(word) = &final_word {
-        print!("{}", if options.json { summary::json(word, restarts) } else { summary::text(word, restarts) });
+        print!(
+            "{}",
+            if options.json { summary::json(word, restarts) } else { summary::text(word, restarts) }
+        );
     }
     Ok(match end {
         End::Finished(RunState::Passed) | End::Asked | End::AllFinished => ExitCode::SUCCESS,
@@ -167,7 +170,8 @@ fn answer(
         Request::Status => Answer::Status(Box::new(monitor.status(supervisor, &graph.file))),
         Request::Restart { role } if supervisor.restart(&role) => Answer::Done,
         Request::Restart { role } => {
-            let known: Vec<&str> = supervisor.services.iter().map(|service| service.service.role.as_str()).collect();
+            let known: Vec<&str> =
+                supervisor.services.iter().map(|service| service.service.role.as_str()).collect();
             Answer::Refused(format!("there is no service `{role}`; there are {}", known.join(", ")))
         }
         Request::Stop { .. } => {
