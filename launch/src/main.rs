@@ -1,2 +1,57 @@
-//! placeholder
-fn main() {}
+//! The launcher: checks, starts, watches, swaps and stops the services of a robot.
+
+mod cli;
+mod commands;
+mod conductor;
+mod control;
+mod detach;
+mod graph;
+mod lockstep;
+mod monitor;
+mod observer;
+mod plain;
+mod summary;
+mod supervise;
+mod up;
+
+use clap::Parser as _;
+use cli::{Cli, Command, UpArgs};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match Cli::parse().command {
+        Command::Check(args) => graph::check_command(&args.which.request(None), args.json),
+        Command::Up(args) => up_command(&args),
+        Command::Ps(args) => commands::finish(commands::ps(&args)),
+        Command::Top(args) => commands::finish(commands::top(&args)),
+        Command::Logs(args) => commands::finish(commands::logs(&args)),
+        Command::Restart(args) => commands::finish(commands::restart(&args)),
+        Command::Stop(args) => commands::finish(commands::stop(&args)),
+        Command::Graph(args) => graph::graph_command(&args.which.request(None), args.dot),
+        Command::Order(args) => commands::finish(commands::order(&args)),
+        Command::Completions { shell } => {
+            cli::print_completions(shell);
+            ExitCode::SUCCESS
+        }
+        Command::CleanDead { board } => {
+            // What cannot be cleaned now is cleaned when the board is taken down.
+            let _ = board::host::clean_dead(&board);
+            ExitCode::SUCCESS
+        }
+    }
+}
+
+fn up_command(args: &UpArgs) -> ExitCode {
+    let Some(graph) = graph::prepare(&args.which.request(args.board.as_deref())) else { return ExitCode::FAILURE };
+    if args.detach {
+        return commands::finish(detach::detach(args.board.as_deref().unwrap_or(&graph.name)));
+    }
+    let options =
+        up::Options { board: args.board.clone(), logs: args.log_dir.clone(), json: args.json };
+    let mut display = plain::Lines::new(args.no_view);
+    if args.lockstep {
+        let pace = lockstep::Pace { speed: args.speed, until_s: args.until, cpu: args.cpu };
+        return lockstep::up(&graph, &options, &pace, &mut display);
+    }
+    up::up(&graph, &options, &mut display)
+}

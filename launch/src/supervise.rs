@@ -1,7 +1,7 @@
 //! Starts the services, sees at once when one dies or hangs, cleans up after it, and starts it again.
 
-use crate::graph::check::{Checked, CheckedService, Publisher};
-use crate::graph::settings::Priority;
+use crate::graph::{Checked, CheckedService, Publisher};
+use crate::graph::Priority;
 use board::host::{self, Host, HostError};
 use board::manifest::{Manifest, Topic};
 use board::switchboard::SlotState;

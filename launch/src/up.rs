@@ -1,7 +1,7 @@
 //! `launch up`: from a checked graph to a running robot, and back to an empty machine.
 
 use crate::control::{self, Answer, Request};
-use crate::graph::check::Checked;
+use crate::graph::Checked;
 use crate::monitor::Monitor;
 use crate::summary;
 use crate::supervise::Supervisor;
@@ -178,13 +178,14 @@ fn answer(
 }
 
 /// INT, TERM and HUP as a readable descriptor and a count.
-struct Signals {
+#[derive(Debug)]
+pub(crate) struct Signals {
     reader: UnixStream,
     count: Arc<AtomicUsize>,
 }
 
 impl Signals {
-    fn catch() -> std::io::Result<Self> {
+    pub(crate) fn catch() -> std::io::Result<Self> {
         let (reader, writer) = UnixStream::pair()?;
         reader.set_nonblocking(true)?;
         writer.set_nonblocking(true)?;
@@ -202,7 +203,7 @@ impl Signals {
         Ok(Self { reader, count })
     }
 
-    fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.count.load(Ordering::Acquire)
     }
 

@@ -18,9 +18,9 @@
 //! A robot that stands before a static obstacle must be able to leave. The signal stays STOP, as the paper wants; the base driver,
 //! if `allow_escape` is set, lets one kind of motion pass in spite of it, because it leads away from the violated face:
 //! - `reason` is `Violation` or `Remembered`, and `violated_faces` is exactly `Face::Front`; never with another reason, and never
-//!   with an invalid or stale clearance;
-//! - the command is straight back or nearly so: both wheels in [-0.1 m/s, 0], and neither more than half as fast again as the other;
-//! - at most 0.3 m in one stop, as odometry counts it; only a GO begins a new count.
+//!   with an invalid or stale clearance (while it is `Settling` no face is violated, and the robot waits);
+//! - the command is backwards with both wheels, none faster than `escape_speed_mps` (about 0.1 m/s), best of all straight back;
+//! - at most `escape_distance_m` (about 0.3 m) in one stop, as the wheels count it; only a GO begins a new count.
 //!
 //! There is no sensor at the rear, which is why speed and distance are small: the robot only returns to where it just came from.
 //! Turning on the spot is not let pass: the corners of a 0.61 x 0.51 m body swing out by 0.09 m ahead and 0.14 m aside. When a side

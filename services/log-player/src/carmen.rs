@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 pub fn read(text: &str, timing: Timing, period_s: f64) -> Log {
     let mut log = Log::default();
     // Records, each with its own time stamp; the truth of a scan shares the scan's.
-    let mut moments: Vec<(Option<f64>, Vec<Record>)> = Vec::new();
+    let mut moments: Vec<Moment> = Vec::new();
     for (index, line) in text.lines().enumerate() {
         match read_line(line) {
             Ok(Some(moment)) => moments.push(moment),
@@ -51,7 +51,10 @@ fn are_of_use(stamps: impl Iterator<Item = Option<f64>>) -> bool {
     2 * forward > lines
 }
 
-fn read_line(line: &str) -> Result<Option<(Option<f64>, Vec<Record>)>, Fault> {
+/// What a line recorded, and its time stamp.
+type Moment = (Option<f64>, Vec<Record>);
+
+fn read_line(line: &str) -> Result<Option<Moment>, Fault> {
     let Some(keyword) = line.split_ascii_whitespace().next() else { return Ok(None) };
     match keyword {
         "ODOM" => {
@@ -73,7 +76,13 @@ fn read_line(line: &str) -> Result<Option<(Option<f64>, Vec<Record>)>, Fault> {
         }
         comment if comment.starts_with('#') => Ok(None),
         // Parameters, other sensors, and what corrections have left behind.
-        other if other.bytes().all(|byte| byte.is_ascii_uppercase() || byte.is_ascii_digit() || byte == b'_') => Ok(None),
+        other
+            if other
+                .bytes()
+                .all(|byte| byte.is_ascii_uppercase() || byte.is_ascii_digit() || byte == b'_') =>
+        {
+            Ok(None)
+        }
         word => Err(Fault::UnknownLine { word: beginning(word) }),
     }
 }

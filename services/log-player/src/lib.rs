@@ -19,9 +19,7 @@ pub use params::{AnchorPlace, Format, Params, ParamsError, Pose, Timing};
 pub use steps::read as read_steps;
 
 use geometry::Pose2;
-use messages::{
-    ANCHOR_CAPACITY, AnchorRange, Odometry, Parameters, RangeScan, TagRanges, Time, TruePose,
-};
+use messages::{ANCHOR_CAPACITY, AnchorRange, Odometry, Parameters, RangeScan, TagRanges, Time, TruePose};
 use std::time::Duration;
 
 /// A message of the log.

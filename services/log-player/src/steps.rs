@@ -71,7 +71,10 @@ impl Reader {
         words.need(7 + count)?;
         let ranges_m = words.ranges(7, count)?;
         let angle_step_rad = aperture_rad / (count.max(2) - 1) as f64;
-        self.push(step, Record::Scan { sensor, angle_min_rad: -0.5 * aperture_rad, angle_step_rad, ranges_m });
+        self.push(
+            step,
+            Record::Scan { sensor, angle_min_rad: -0.5 * aperture_rad, angle_step_rad, ranges_m },
+        );
         Ok(())
     }
 
@@ -84,7 +87,8 @@ impl Reader {
         }
         // Beacons of one step that share an antenna were heard at once.
         if step == self.step
-            && let Some(Entry { record: Record::Ranges { antenna_m, heard }, .. }) = self.log.entries.last_mut()
+            && let Some(Entry { record: Record::Ranges { antenna_m, heard }, .. }) =
+                self.log.entries.last_mut()
             && *antenna_m == antenna
         {
             heard.push((id as u32, range_m));

@@ -1,4 +1,5 @@
 use crate::*;
+use std::f64::consts::FRAC_PI_2;
 use std::io::Write;
 
 const STEPS: &str = "\
@@ -33,7 +34,7 @@ fn anchors() -> Params {
     let anchor = |id, x_m, y_m| AnchorPlace { id, x_m, y_m, z_m: 2.0 };
     Params {
         anchors: vec![anchor(1, 1.0, 1.0), anchor(2, 4.0, 1.0)],
-        map_in_anchor_frame: Pose { x_m: 1.0, y_m: 0.0, heading_rad: std::f64::consts::FRAC_PI_2 },
+        map_in_anchor_frame: Pose { x_m: 1.0, y_m: 0.0, heading_rad: FRAC_PI_2 },
         start_delay_s: 0.0,
         ..Params::default()
     }
@@ -55,10 +56,15 @@ fn a_log_in_steps_is_read() {
     let log = steps(STEPS);
     assert_eq!(log.problems, []);
     assert_eq!(log.entries.len(), 8);
-    assert_eq!(log.entries[2].record, Record::Ranges { antenna_m: [0.16, 0.0, 1.12], heard: vec![(1, 5.0), (2, 6.0)] });
-    let Record::Scan { ranges_m, angle_min_rad, angle_step_rad, .. } = &log.entries[1].record else { panic!("{log:?}") };
+    assert_eq!(
+        log.entries[2].record,
+        Record::Ranges { antenna_m: [0.16, 0.0, 1.12], heard: vec![(1, 5.0), (2, 6.0)] }
+    );
+    let Record::Scan { ranges_m, angle_min_rad, angle_step_rad, .. } = &log.entries[1].record else {
+        panic!("{log:?}")
+    };
     assert_eq!(ranges_m, &[1.0, 2.0, 81.0]);
-    assert!((angle_min_rad + 1.5708).abs() < 1e-4 && (angle_step_rad - 1.5708).abs() < 1e-4);
+    assert!((angle_min_rad + FRAC_PI_2).abs() < 1e-4 && (angle_step_rad - FRAC_PI_2).abs() < 1e-4);
     // The second step drives along the heading that the first has turned to.
     let Record::Odometry(last) = &log.entries[6].record else { panic!("{log:?}") };
     assert!((last.x_m - 0.5).abs() < 1e-9 && (last.y_m - 0.5).abs() < 1e-9);
@@ -67,7 +73,8 @@ fn a_log_in_steps_is_read() {
 #[test]
 fn the_truth_comes_after_the_moment_and_before_the_next() {
     let log = steps(STEPS);
-    let truths: Vec<f64> = log.entries.iter().filter(|one| matches!(one.record, Record::Truth(_))).map(|one| one.at_s).collect();
+    let truths: Vec<f64> =
+        log.entries.iter().filter(|one| matches!(one.record, Record::Truth(_))).map(|one| one.at_s).collect();
     assert_eq!(truths, [1.5, 2.5]);
 }
 
@@ -84,7 +91,10 @@ fn a_carmen_log_is_read() {
 fn useless_stamps_give_way_to_the_order() {
     let text = "ODOM 0 0 0 0 0 0 1.13486e+09 h 1.13486e+09\n".repeat(5);
     let times: Vec<f64> = carmen(&text).entries.iter().map(|one| one.at_s).collect();
-    assert!(times.iter().zip([0.0, 0.1, 0.2, 0.3, 0.4]).all(|(time, wanted)| (time - wanted).abs() < 1e-9), "{times:?}");
+    assert!(
+        times.iter().zip([0.0, 0.1, 0.2, 0.3, 0.4]).all(|(time, wanted)| (time - wanted).abs() < 1e-9),
+        "{times:?}"
+    );
 }
 
 #[track_caller]
@@ -116,7 +126,8 @@ fn garbled_lines_are_named_and_left_out() {
 
 #[test]
 fn the_schedule_follows_the_speed() {
-    let mut player = LogPlayer::new(&Params { speed: 10.0, start_delay_s: 0.2, ..anchors() }, steps(STEPS)).unwrap();
+    let mut player =
+        LogPlayer::new(&Params { speed: 10.0, start_delay_s: 0.2, ..anchors() }, steps(STEPS)).unwrap();
     let begun = Time::from_secs_f64(100.0);
     let mut at = |second: f64| kinds(player.step(begun.after(Duration::from_secs_f64(second))));
     assert_eq!(at(0.0), "");
@@ -149,7 +160,7 @@ fn messages_are_in_the_map() {
     let later = player.step(Time::from_secs_f64(1.06)).to_vec();
     let Due::Odometry(odometry) = &later[0] else { panic!("{later:?}") };
     assert!((odometry.forward_mps - 0.5).abs() < 1e-9);
-    assert!((odometry.right_travel_m - odometry.left_travel_m - 0.4 * std::f64::consts::FRAC_PI_2).abs() < 1e-9);
+    assert!((odometry.right_travel_m - odometry.left_travel_m - 0.4 * FRAC_PI_2).abs() < 1e-9);
 }
 
 #[test]
@@ -190,7 +201,8 @@ fn packed(text: &str) -> Vec<u8> {
 
 #[test]
 fn a_compressed_file_that_ends_early_is_played_up_to_there() {
-    let text: String = (0..5000).map(|step| format!("ODOM {step} 0.0{} 0.1 0.{}\n", step * 7919 % 997, step % 89)).collect();
+    let text: String =
+        (0..5000).map(|step| format!("ODOM {step} 0.0{} 0.1 0.{}\n", step * 7919 % 997, step % 89)).collect();
     let mut bytes = packed(&text);
     bytes.truncate(bytes.len() / 2);
     let folder = tempfile::tempdir().unwrap();
@@ -212,7 +224,10 @@ fn files_that_hold_nothing_are_refused() {
     assert!(load(&params).unwrap_err().to_string().contains("cannot read"));
     std::fs::write(&file, "hello\n").unwrap();
     let error = load(&params).unwrap_err().to_string();
-    assert!(error.contains("holds nothing that can be played") && error.contains("line 1: `hello`"), "{error}");
+    assert!(
+        error.contains("holds nothing that can be played") && error.contains("line 1: `hello`"),
+        "{error}"
+    );
     assert_eq!(load(&Params::default()).unwrap(), Log::default());
 }
 

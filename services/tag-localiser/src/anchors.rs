@@ -57,15 +57,16 @@ impl Anchors {
     /// The slot of an anchor that is heard now; `None` when it was heard in this message already, or when the list is full.
     pub(crate) fn hear(&mut self, floor: i32, anchor: &AnchorRange) -> Option<usize> {
         let place = [anchor.x_m, anchor.y_m, anchor.z_m];
-        let slot = match self.known[..self.count].iter().position(|one| one.floor == floor && one.id == anchor.id) {
-            Some(slot) => slot,
-            None if self.count < ANCHOR_LIMIT => {
-                self.known[self.count] = Anchor { floor, id: anchor.id, ..Anchor::default() };
-                self.count += 1;
-                self.count - 1
-            }
-            None => return None,
-        };
+        let slot =
+            match self.known[..self.count].iter().position(|one| one.floor == floor && one.id == anchor.id) {
+                Some(slot) => slot,
+                None if self.count < ANCHOR_LIMIT => {
+                    self.known[self.count] = Anchor { floor, id: anchor.id, ..Anchor::default() };
+                    self.count += 1;
+                    self.count - 1
+                }
+                None => return None,
+            };
         let known = &mut self.known[slot];
         if known.heard == self.messages {
             return None;

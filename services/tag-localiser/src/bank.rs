@@ -67,7 +67,14 @@ impl Bank {
     }
 
     /// Every heading at a place of the antenna.
-    pub(crate) fn scatter(&mut self, antenna_at: [f64; 2], antenna_m: [f64; 2], sigma_m: f64, log_weight: f64, wrong: f64) {
+    pub(crate) fn scatter(
+        &mut self,
+        antenna_at: [f64; 2],
+        antenna_m: [f64; 2],
+        sigma_m: f64,
+        log_weight: f64,
+        wrong: f64,
+    ) {
         for index in 0..HEADINGS {
             let heading_rad = (index as f64 / HEADINGS as f64) * std::f64::consts::TAU;
             let facing = Pose2::new(0.0, 0.0, heading_rad);
@@ -112,7 +119,8 @@ impl Bank {
         for (index, hypothesis) in self.held.iter_mut().enumerate() {
             let wrong = f64::from(hypothesis.wrong[reading.slot]);
             let prior = (1.0 - wrong) * (1.0 - outlier) + wrong * recovery;
-            let share = hypothesis.correct(&hypothesis.compare_range(&RangeReading { prior, ..*reading }), self.news);
+            let share =
+                hypothesis.correct(&hypothesis.compare_range(&RangeReading { prior, ..*reading }), self.news);
             hypothesis.wrong[reading.slot] = (1.0 - share) as f32;
             if index == best {
                 verdict = share;
@@ -146,7 +154,9 @@ impl Bank {
 
     /// Drops the unlikely, joins the equal, and scales the weights so that the best has weight one.
     pub(crate) fn tidy(&mut self) {
-        self.held.retain(|one| one.log_weight.is_finite() && one.pose.is_finite() && one.covariance.iter().all(|v| v.is_finite()));
+        self.held.retain(|one| {
+            one.log_weight.is_finite() && one.pose.is_finite() && one.covariance.iter().all(|v| v.is_finite())
+        });
         self.sort();
         let Some(best) = self.held.first().map(|one| one.log_weight) else { return };
         self.held.retain(|one| one.log_weight >= best - PRUNE);

@@ -50,8 +50,7 @@ impl Hypothesis {
     /// path, so that it does not depend on how often odometry reports).
     pub(crate) fn advance(&mut self, motion: Pose2, noise: MotionNoise) {
         let (sine, cosine) = self.pose.heading_rad.sin_cos();
-        let (x_m, y_m) =
-            (cosine * motion.x_m - sine * motion.y_m, sine * motion.x_m + cosine * motion.y_m);
+        let (x_m, y_m) = (cosine * motion.x_m - sine * motion.y_m, sine * motion.x_m + cosine * motion.y_m);
         let path_m = motion.x_m.hypot(motion.y_m);
         let place = noise.distance_sigma_m * noise.distance_sigma_m * path_m;
         let heading = noise.drift_sigma_rad * noise.drift_sigma_rad * path_m
@@ -59,11 +58,8 @@ impl Hypothesis {
         let step = Matrix3::new(1.0, 0.0, -y_m, 0.0, 1.0, x_m, 0.0, 0.0, 1.0);
         self.covariance = step * self.covariance * step.transpose()
             + Matrix3::from_diagonal(&Vector3::new(place, place, heading));
-        self.pose = Pose2::new(
-            self.pose.x_m + x_m,
-            self.pose.y_m + y_m,
-            self.pose.heading_rad + motion.heading_rad,
-        );
+        self.pose =
+            Pose2::new(self.pose.x_m + x_m, self.pose.y_m + y_m, self.pose.heading_rad + motion.heading_rad);
     }
 
     /// Adds uncertainty.
@@ -89,11 +85,8 @@ impl Hypothesis {
         self.log_weight += news * total.ln();
         let gain = spread / variance;
         let shift = gain * (share * seen.innovation);
-        self.pose = Pose2::new(
-            self.pose.x_m + shift.x,
-            self.pose.y_m + shift.y,
-            self.pose.heading_rad + shift.z,
-        );
+        self.pose =
+            Pose2::new(self.pose.x_m + shift.x, self.pose.y_m + shift.y, self.pose.heading_rad + shift.z);
         let shrink = share * variance - share * (1.0 - share) * seen.innovation * seen.innovation;
         self.covariance -= gain * gain.transpose() * shrink;
         // Rounding must not make it lopsided.
@@ -107,7 +100,8 @@ impl Hypothesis {
         let (sine, cosine) = self.pose.heading_rad.sin_cos();
         let [forward_m, left_m] = reading.antenna_m;
         let offset = (cosine * forward_m - sine * left_m, sine * forward_m + cosine * left_m);
-        let away = (self.pose.x_m + offset.0 - reading.anchor_m[0], self.pose.y_m + offset.1 - reading.anchor_m[1]);
+        let away =
+            (self.pose.x_m + offset.0 - reading.anchor_m[0], self.pose.y_m + offset.1 - reading.anchor_m[1]);
         let flat_m = away.0.hypot(away.1).max(1e-3);
         let expected_m = flat_m.hypot(reading.rise_m).max(0.2);
         let jacobian = RowVector3::new(

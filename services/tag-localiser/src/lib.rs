@@ -7,6 +7,7 @@
 
 mod anchors;
 mod bank;
+mod corrections;
 mod hypothesis;
 mod params;
 mod places;
@@ -20,13 +21,12 @@ pub use walls::HallwayWalls;
 
 use anchors::{AnchorBits, Anchors};
 use bank::{Bank, Estimate, HEADINGS};
-use geometry::{Pose2, angle};
-use hypothesis::{Comparison, Hypothesis, MotionNoise, RangeReading};
+use geometry::Pose2;
+use hypothesis::{Hypothesis, MotionNoise, RangeReading};
 use messages::{
-    ANCHOR_CAPACITY, HeadingCorrection, LocationStateName, Message, Odometry, Parameters, PoseEstimate, Stamped,
-    TagRanges, Time, TofRanges,
+    ANCHOR_CAPACITY, HeadingCorrection, LocationStateName, Message, Odometry, Parameters, PoseEstimate,
+    Stamped, TagRanges, Time, TofRanges,
 };
-use nalgebra::RowVector3;
 use places::{PLACE_LIMIT, Places};
 
 /// What a step sees. A message seen before is recognised by its stamp and count, and not used again, odometry excepted, which is a state.
@@ -56,8 +56,6 @@ const KNOWN_SIGMA_RAD: f64 = 0.5;
 const MANY_REJECTED: f64 = 0.3;
 /// From this share of side readings on that contradict the walls, though they agree with each other, averaged over about ten frames, the estimate is degraded.
 const SIDES_DISAGREE: f64 = 0.8;
-/// A heading correction is never believed better than this: a wall is drawn, and measured from half a metre away.
-const HEADING_SIGMA_RAD: f64 = 0.02;
 /// Uncertainty that each tag message adds, so that a robot at rest can still be pushed.
 const RESTLESS_SIGMA_M: f64 = 0.005;
 const RESTLESS_SIGMA_RAD: f64 = 0.001;
@@ -276,7 +274,13 @@ impl TagLocaliser {
     /// The first belief: all places that the readings allow, with all headings.
     fn begin(&mut self, readings: &[RangeReading], position: Option<[f64; 2]>, antenna_m: [f64; 2]) {
         if let Some(at_m) = position {
-            self.bank.scatter(at_m, antenna_m, 2.0 * self.params.position_sigma_m, 0.0, self.params.outlier_chance);
+            self.bank.scatter(
+                at_m,
+                antenna_m,
+                2.0 * self.params.position_sigma_m,
+                0.0,
+                self.params.outlier_chance,
+            );
             return;
         }
         let places = Places::find(readings);
@@ -284,45 +288,6 @@ impl TagLocaliser {
         for place in places.as_slice() {
             self.bank.scatter(place.at_m, antenna_m, 3.0 * self.params.range_sigma_m, 0.0, NEW_WRONG);
         }
-    }
-
-    /// Corrects by a position of the antenna: its two coordinates are good or wrong together.
-    fn place_at(&mut self, at_m: [f64; 2], antenna_m: [f64; 2]) -> bool {
-        let sigma_m = self.params.position_sigma_m;
-        let outlier = self.params.outlier_chance;
-        let gate = |one: &Hypothesis| {
-            let antenna = one.pose.transform(geometry::Point2::new(antenna_m[0], antenna_m[1]));
-            let (dx_m, dy_m) = (at_m[0] - antenna.x, at_m[1] - antenna.y);
-            let variance = sigma_m * sigma_m + 0.5 * (one.covariance[(0, 0)] + one.covariance[(1, 1)]);
-            // Chi-square with two degrees of freedom: 1 % lie beyond.
-            dx_m * dx_m + dy_m * dy_m < 9.21 * variance
-        };
-        let mut good = self.bank.best().is_some_and(gate);
-        for axis in 0..2 {
-            let verdict = self.bank.observe(WRONG_RANGE_DENSITY, |one| {
-                let lever = one.pose.transform(geometry::Point2::new(antenna_m[0], antenna_m[1]))
-                    - one.pose.position();
-                let (expected_m, swing) = if axis == 0 {
-                    (one.pose.x_m + lever.x, -lever.y)
-                } else {
-                    (one.pose.y_m + lever.y, lever.x)
-                };
-                let jacobian = if axis == 0 {
-                    RowVector3::new(1.0, 0.0, swing)
-                } else {
-                    RowVector3::new(0.0, 1.0, swing)
-                };
-                gate(one).then_some(Comparison {
-                    innovation: at_m[axis] - expected_m,
-                    jacobian,
-                    variance: sigma_m * sigma_m,
-                    prior: 1.0 - outlier,
-                    wrong_density: WRONG_RANGE_DENSITY,
-                })
-            });
-            good &= verdict.is_some_and(|share| share > 0.5);
-        }
-        good
     }
 
     /// When the readings contradict the belief for long, and agree among each other on another place, that place is tried beside it.
@@ -346,69 +311,6 @@ impl TagLocaliser {
         }
     }
 
-    /// The hallway's direction plus the angle to it, or the opposite direction.
-    fn turn_to_wall(&mut self, heading: &HeadingCorrection) {
-        let measured_rad = heading.wall_heading_rad + heading.angle_rad;
-        if heading.valid != 1 || !measured_rad.is_finite() || !heading.sigma_rad.is_finite() {
-            return;
-        }
-        let sigma_rad = heading.sigma_rad.clamp(HEADING_SIGMA_RAD, 1.0);
-        self.bank.observe(WRONG_HEADING_DENSITY, |one| {
-            let ahead_rad = angle::difference(measured_rad, one.pose.heading_rad);
-            // A wall looks the same from both ends.
-            let innovation = if ahead_rad.abs() > std::f64::consts::FRAC_PI_2 {
-                angle::wrap(ahead_rad + std::f64::consts::PI)
-            } else {
-                ahead_rad
-            };
-            Some(Comparison {
-                innovation,
-                jacobian: RowVector3::new(0.0, 0.0, 1.0),
-                variance: sigma_rad * sigma_rad,
-                prior: 0.9,
-                wrong_density: WRONG_HEADING_DENSITY,
-            })
-        });
-        self.bank.tidy();
-    }
-
-    fn sides_are_due(&mut self, stamp: Time) -> bool {
-        let due = self.seen.ranges.is_none_or(|last| {
-            // A stamp before the last one is another clock's; then the message is new.
-            stamp < last || (stamp > last && stamp.seconds_since(last) >= self.params.side_period_s)
-        });
-        if due {
-            self.seen.ranges = Some(stamp);
-        }
-        due && !self.walls.is_empty()
-    }
-
-    /// Side sensors against walls. Only with few hypotheses left: walls are alike, and a wide belief would pick the wrong one.
-    fn feel_walls(&mut self, ranges: &TofRanges) {
-        let Some(floor) = self.floor else { return };
-        let certain = self.bank.estimate().is_some_and(|one| one.sigma_m() < 0.5 && one.sigma_rad() < 0.3);
-        if !certain {
-            return;
-        }
-        let (walls, sigma_m) = (&self.walls, self.params.side_sigma_m);
-        let Some(agreeing) = self.bank.best().map(|best| walls.agreeing(best, floor, ranges, sigma_m)) else { return };
-        let (mut seen, mut fitting) = (0.0, 0.0);
-        for sensor in walls::SIDE_SENSORS.into_iter().filter(|sensor| agreeing.contains(*sensor)) {
-            let verdict = self.bank.observe(HallwayWalls::WRONG_DENSITY, |one| {
-                let mut comparison = walls.compare(one, floor, sensor, ranges, sigma_m)?;
-                comparison.variance *= agreeing.caution;
-                Some(comparison)
-            });
-            if let Some(share) = verdict {
-                (seen, fitting) = (seen + 1.0, fitting + share);
-            }
-        }
-        if seen > 0.0 {
-            self.disagreeing_sides += 0.1 * (1.0 - fitting / seen - self.disagreeing_sides);
-        }
-        self.bank.tidy();
-    }
-
     fn accept(&mut self) {
         self.accepted += 1;
         self.rejected_share -= 0.1 * self.rejected_share;
@@ -423,10 +325,8 @@ impl TagLocaliser {
         let floor = self.floor.unwrap_or_default();
         let best = self.bank.estimate();
         let place = best.map(|one| [one.pose.x_m, one.pose.y_m]);
-        let silent = self
-            .seen
-            .tag
-            .is_none_or(|(stamp, _)| now.seconds_since(stamp) > self.params.tag_timeout_s);
+        let silent =
+            self.seen.tag.is_none_or(|(stamp, _)| now.seconds_since(stamp) > self.params.tag_timeout_s);
         let mut bits = self.anchors.bits(floor, place, self.params.silent_messages);
         if silent {
             bits = AnchorBits { alive: 0, dead: bits.alive | bits.dead };
@@ -484,8 +384,6 @@ impl TagLocaliser {
 
 /// A wrong range is anywhere within 20 m.
 const WRONG_RANGE_DENSITY: f64 = 0.05;
-/// A wrong heading is any of half a turn.
-const WRONG_HEADING_DENSITY: f64 = std::f64::consts::FRAC_1_PI;
 /// Probability, for a place just found, that an anchor was wrong there.
 const NEW_WRONG: f64 = 0.3;
 

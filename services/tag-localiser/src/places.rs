@@ -115,7 +115,8 @@ fn judge(at_m: [f64; 2], readings: &[RangeReading]) -> Place {
     for reading in readings {
         let (error_m, _) = residual(at_m, reading);
         let variance = 2.0 * reading.variance;
-        let good = 0.8 * (-0.5 * error_m * error_m / variance).exp() / (std::f64::consts::TAU * variance).sqrt();
+        let good =
+            0.8 * (-0.5 * error_m * error_m / variance).exp() / (std::f64::consts::TAU * variance).sqrt();
         let wrong = 0.2 * reading.wrong_density;
         place.score += (good + wrong).ln();
         place.explained += usize::from(good > wrong);

@@ -75,16 +75,28 @@ struct Run {
 fn replay(seed: u64, spoil: Spoil, params: Params) -> Run {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut localiser = TagLocaliser::new(params, HallwayWalls::default()).unwrap();
-    let mut run = Run { errors_m: Vec::new(), unknown: 0, last: PoseEstimate::default(), degraded: 0, consistency: 0.0 };
+    let mut run = Run {
+        errors_m: Vec::new(),
+        unknown: 0,
+        last: PoseEstimate::default(),
+        degraded: 0,
+        consistency: 0.0,
+    };
     let (mut odometry, mut before) = (Pose2::IDENTITY, None::<Pose2>);
     for (index, step) in recording().iter().enumerate().skip(spoil.begin) {
         let now = Time::from_secs_f64(index as f64 * 1.05);
         let mut motion = before.map_or(Pose2::IDENTITY, |last| last.to(step.odometry));
         before = Some(step.odometry);
-        let mut noisy = |value: f64| value * (1.0 + Normal::new(0.0, spoil.wheel_noise).unwrap().sample(&mut random));
+        let mut noisy =
+            |value: f64| value * (1.0 + Normal::new(0.0, spoil.wheel_noise).unwrap().sample(&mut random));
         motion = Pose2::new(noisy(motion.x_m), noisy(motion.y_m), noisy(motion.heading_rad));
         odometry = odometry.compose(motion);
-        let message = Odometry { x_m: odometry.x_m, y_m: odometry.y_m, heading_rad: odometry.heading_rad, ..Odometry::default() };
+        let message = Odometry {
+            x_m: odometry.x_m,
+            y_m: odometry.y_m,
+            heading_rad: odometry.heading_rad,
+            ..Odometry::default()
+        };
         let mut tag = TagRanges { antenna_x_m: 0.16, antenna_z_m: 1.12, ..TagRanges::default() };
         for &(id, range_m) in &step.ranges {
             let dropped = random.random::<f64>() < spoil.drop;
@@ -96,10 +108,15 @@ fn replay(seed: u64, spoil: Spoil, params: Params) -> Run {
             }
             let [x_m, y_m, z_m] = beacon(id);
             let range_m = if outlier { elsewhere_m } else { range_m + noise_m };
-            tag.anchors[tag.anchor_count as usize] = AnchorRange { x_m, y_m, z_m, range_m, id, quality_percent: 100.0 };
+            tag.anchors[tag.anchor_count as usize] =
+                AnchorRange { x_m, y_m, z_m, range_m, id, quality_percent: 100.0 };
             tag.anchor_count += 1;
         }
-        let inputs = Inputs { odometry: Some(Stamped::new(now, &message)), tag: Some(Stamped::new(now, &tag)), ..Inputs::default() };
+        let inputs = Inputs {
+            odometry: Some(Stamped::new(now, &message)),
+            tag: Some(Stamped::new(now, &tag)),
+            ..Inputs::default()
+        };
         run.last = localiser.step(now, inputs).pose;
         let Some(truth) = step.truth else { continue };
         match run.last.pose() {
@@ -119,15 +136,24 @@ fn replay(seed: u64, spoil: Spoil, params: Params) -> Run {
 
 #[track_caller]
 fn check(spoil: Spoil, median_m: f64, most_m: f64, most_unknown: usize) {
-    let seeds = if spoil.drop + spoil.outliers + spoil.noise_m + spoil.wheel_noise > 0.0 { 1..=5 } else { 1..=1 };
+    let seeds =
+        if spoil.drop + spoil.outliers + spoil.noise_m + spoil.wheel_noise > 0.0 { 1..=5 } else { 1..=1 };
     for seed in seeds {
         let run = replay(seed, spoil, Params::default());
         let (middle_m, high_m) = (median(&run.errors_m), quantile(&run.errors_m, 0.95));
         println!(
             "{spoil:?} seed {seed}: median {middle_m:.3} m, 95 % {high_m:.3} m, most {:.3} m, unknown {}, degraded {}, consistency {:.2}, accepted {}, rejected {}",
-            quantile(&run.errors_m, 1.0), run.unknown, run.degraded, run.consistency, run.last.accepted, run.last.rejected
+            quantile(&run.errors_m, 1.0),
+            run.unknown,
+            run.degraded,
+            run.consistency,
+            run.last.accepted,
+            run.last.rejected
         );
-        assert!(middle_m <= median_m && high_m <= most_m && run.unknown <= most_unknown, "{spoil:?}, seed {seed}");
+        assert!(
+            middle_m <= median_m && high_m <= most_m && run.unknown <= most_unknown,
+            "{spoil:?}, seed {seed}"
+        );
     }
 }
 

@@ -7,7 +7,14 @@ use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 
 pub(crate) fn hallway_anchors() -> [[f64; 3]; 6] {
-    [[2.0, 0.8, 2.4], [9.0, -0.8, 2.4], [16.0, 0.8, 2.4], [23.0, -0.8, 2.4], [30.0, 0.8, 2.4], [37.0, -0.8, 2.4]]
+    [
+        [2.0, 0.8, 2.4],
+        [9.0, -0.8, 2.4],
+        [16.0, 0.8, 2.4],
+        [23.0, -0.8, 2.4],
+        [30.0, 0.8, 2.4],
+        [37.0, -0.8, 2.4],
+    ]
 }
 
 pub(crate) fn range_to(pose: Pose2, antenna: [f64; 3], anchor: [f64; 3]) -> f64 {
@@ -94,7 +101,8 @@ impl Hallway {
 
     fn hear(&mut self) -> TagRanges {
         let mut tag = TagRanges { antenna_z_m: 1.0, floor: 2, anchor_count: 4, ..TagRanges::default() };
-        let mut anchors = hallway_anchors().map(|anchor| (range_to(self.truth, [0.0, 0.0, 1.0], anchor), anchor));
+        let mut anchors =
+            hallway_anchors().map(|anchor| (range_to(self.truth, [0.0, 0.0, 1.0], anchor), anchor));
         anchors.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (slot, (range_m, anchor)) in tag.anchors.iter_mut().zip(anchors.into_iter().take(4)) {
             let mut range_m = range_m + self.normal(0.10);
@@ -102,7 +110,14 @@ impl Hallway {
                 range_m += if self.random.random::<bool>() { 1.0 } else { -1.0 };
             }
             let id = (anchor[0] * 10.0) as u32;
-            *slot = AnchorRange { x_m: anchor[0], y_m: anchor[1], z_m: anchor[2], range_m, id, quality_percent: 60.0 };
+            *slot = AnchorRange {
+                x_m: anchor[0],
+                y_m: anchor[1],
+                z_m: anchor[2],
+                range_m,
+                id,
+                quality_percent: 60.0,
+            };
         }
         tag
     }

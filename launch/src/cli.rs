@@ -1,0 +1,293 @@
+//! The command line.
+
+use crate::graph::{Overrides, Request};
+use clap::{Args, CommandFactory as _, Parser, Subcommand};
+use std::path::PathBuf;
+
+const EXAMPLES: &str = "\
+Examples:
+  launch check coffee                              is the graph in order?
+  launch up coffee                                 start it, watch it, Ctrl-C stops it
+  launch up coffee --swap planner=sampling-planner --seed 7
+  launch up coffee --set collision-avoidance.front_radius_m=0.25 --detach
+  launch order 207                                 coffee for room 207, please
+  launch logs planner -f                           follow what the planner says
+  launch stop                                      stop the robot, then its services";
+
+/// Checks, starts, watches and stops the services of a robot.
+#[derive(Debug, Parser)]
+#[command(name = "launch", version, about, after_help = EXAMPLES, max_term_width = 100)]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Check a graph against its binaries, without starting anything
+    #[command(
+        after_help = "Exit code: 0 in order, 1 refused. Every mistake is listed with its line and what to do about it."
+    )]
+    Check(CheckArgs),
+    /// Start a graph and watch over it until Ctrl-C, or until its run ends
+    #[command(after_help = UP_HELP)]
+    Up(UpArgs),
+    /// List the services of a running graph
+    Ps(StatusArgs),
+    /// Watch a running graph: rates, step times, restarts, and the map
+    Top(StatusArgs),
+    /// Show what services said
+    Logs(LogsArgs),
+    /// Start a service of a running graph anew
+    Restart(RestartArgs),
+    /// Stop a running graph: the robot first, then its services
+    Stop(StopArgs),
+    /// Draw services and topics
+    #[command(
+        after_help = "Examples:\n  launch graph coffee > coffee.mmd\n  launch graph coffee --dot | dot -Tsvg > coffee.svg"
+    )]
+    Graph(GraphArgs),
+    /// Order a coffee to a room
+    Order(OrderArgs),
+    /// Print completions for a shell
+    #[command(
+        after_help = "Example:\n  launch completions bash > ~/.local/share/bash-completion/completions/launch"
+    )]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Clean up after services that died; the launcher calls this by itself
+    #[command(hide = true)]
+    CleanDead {
+        /// The board
+        board: String,
+    },
+}
+
+const UP_HELP: &str = "\
+On a terminal a live view shows services, map and mission; elsewhere, and with --plain, each event is a line.
+Exit code: 0 the run passed or was stopped, 1 refused or failed.
+
+Examples:
+  launch up coffee
+  launch up coffee --without elevator --set planner.launch.log=debug
+  launch up ./my-robot.toml --detach --board lab-2";
+
+/// Which graph, and what is different about it this time.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Which {
+    /// A graph's name (`coffee`), or the path of its file
+    #[arg(value_name = "GRAPH", value_hint = clap::ValueHint::FilePath)]
+    pub(crate) graph: String,
+    /// Give a parameter another value; any number of times
+    #[arg(long, value_name = "ROLE.KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Let another binary play a role; any number of times
+    #[arg(long, value_name = "ROLE=BINARY")]
+    pub(crate) swap: Vec<String>,
+    /// Leave a service out; any number of times
+    #[arg(long, value_name = "ROLE")]
+    pub(crate) without: Vec<String>,
+    /// The seed from which all randomness comes
+    #[arg(long, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// In a source checkout: use what is built already
+    #[arg(long)]
+    pub(crate) no_build: bool,
+}
+
+impl Which {
+    /// The same for the checker.
+    pub(crate) fn request(&self, board: Option<&str>) -> Request {
+        Request {
+            graph: self.graph.clone(),
+            overrides: Overrides {
+                set: self.set.clone(),
+                swap: self.swap.clone(),
+                without: self.without.clone(),
+                seed: self.seed,
+                board: board.map(str::to_owned),
+            },
+            build: !self.no_build,
+        }
+    }
+}
+
+/// Which running board.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Running {
+    /// The board; not needed while only one is up
+    #[arg(long, value_name = "NAME")]
+    pub(crate) board: Option<String>,
+}
+
+/// `launch check`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct CheckArgs {
+    /// The graph.
+    #[command(flatten)]
+    pub(crate) which: Which,
+    /// Print verdict, mistakes, services and topics as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `launch up`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct UpArgs {
+    /// The graph.
+    #[command(flatten)]
+    pub(crate) which: Which,
+    /// Come back at once and leave the graph running
+    #[arg(long)]
+    pub(crate) detach: bool,
+    /// Name the board otherwise than the graph does, to run it twice
+    #[arg(long, value_name = "NAME")]
+    pub(crate) board: Option<String>,
+    /// Print a line an event, also on a terminal
+    #[arg(long)]
+    pub(crate) plain: bool,
+    /// Neither a live view nor lines; only what goes wrong
+    #[arg(long, conflicts_with = "plain")]
+    pub(crate) no_view: bool,
+    /// Run in logical time: as fast as possible, identical in every run with one seed
+    #[arg(long)]
+    pub(crate) lockstep: bool,
+    /// In lockstep: logical seconds a second, instead of as fast as possible
+    #[arg(long, value_name = "X", requires = "lockstep", value_parser = positive)]
+    pub(crate) speed: Option<f64>,
+    /// In lockstep: end after so many logical seconds
+    #[arg(long, value_name = "SECONDS", requires = "lockstep", value_parser = positive)]
+    pub(crate) until: Option<f64>,
+    /// In lockstep: the processor for the whole graph
+    #[arg(long, value_name = "N", requires = "lockstep")]
+    pub(crate) cpu: Option<usize>,
+    /// Print the referee's figures as JSON at the end
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Where the logs of the services go
+    #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
+    pub(crate) log_dir: Option<PathBuf>,
+}
+
+/// `launch ps` and `launch top`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct StatusArgs {
+    /// The board.
+    #[command(flatten)]
+    pub(crate) running: Running,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `launch logs`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct LogsArgs {
+    /// The service; all of them without
+    #[arg(value_name = "SERVICE")]
+    pub(crate) service: Option<String>,
+    /// Go on as they speak
+    #[arg(short, long)]
+    pub(crate) follow: bool,
+    /// How many lines from before
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 50)]
+    pub(crate) lines: usize,
+    /// The board.
+    #[command(flatten)]
+    pub(crate) running: Running,
+}
+
+/// `launch restart`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RestartArgs {
+    /// The service
+    #[arg(value_name = "SERVICE")]
+    pub(crate) service: String,
+    /// The board.
+    #[command(flatten)]
+    pub(crate) running: Running,
+}
+
+/// `launch stop`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct StopArgs {
+    /// Do not wait for services that take their time
+    #[arg(long)]
+    pub(crate) fast: bool,
+    /// The board.
+    #[command(flatten)]
+    pub(crate) running: Running,
+}
+
+/// `launch graph`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct GraphArgs {
+    /// The graph.
+    #[command(flatten)]
+    pub(crate) which: Which,
+    /// As Mermaid, for Markdown pages (the default)
+    #[arg(long)]
+    pub(crate) mermaid: bool,
+    /// For Graphviz
+    #[arg(long, conflicts_with = "mermaid")]
+    pub(crate) dot: bool,
+}
+
+/// `launch order`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct OrderArgs {
+    /// The room, such as 207
+    #[arg(value_name = "ROOM")]
+    pub(crate) room: String,
+    /// The board.
+    #[command(flatten)]
+    pub(crate) running: Running,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
+        Ok(number) => Err(format!("{number} is not above zero")),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+/// Prints the completions of the command line.
+pub(crate) fn print_completions(shell: clap_complete::Shell) {
+    clap_complete::generate(shell, &mut Cli::command(), "launch", &mut std::io::stdout());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_definition_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn overrides_reach_the_checker() {
+        let cli = Cli::parse_from([
+            "launch", "up", "coffee", "--set", "a.b=1", "--swap", "c=d", "--seed", "7", "--board", "x",
+        ]);
+        let Command::Up(args) = cli.command else { panic!("not `up`") };
+        let request = args.which.request(args.board.as_deref());
+        assert_eq!(request.graph, "coffee");
+        assert!(request.build);
+        assert_eq!(
+            request.overrides,
+            Overrides {
+                set: vec!["a.b=1".to_owned()],
+                swap: vec!["c=d".to_owned()],
+                without: vec![],
+                seed: Some(7),
+                board: Some("x".to_owned()),
+            }
+        );
+    }
+}

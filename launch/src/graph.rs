@@ -1,0 +1,28 @@
+//! Graph files: reading, checking against the binaries, drawing.
+
+mod binaries;
+mod build;
+mod check;
+mod diagram;
+mod file;
+mod find;
+mod problem;
+mod report;
+mod schema;
+mod settings;
+mod source;
+mod suggest;
+#[cfg(test)]
+mod tests;
+mod topics;
+mod tree;
+
+pub(crate) use file::Overrides;
+pub(crate) use report::{Request, check_command, graph_command};
+#[allow(unused_imports, reason = "the launch commands that start processes take these")]
+pub(crate) use {
+    check::{Checked, CheckedService, CheckedTopic, Publisher, Reader},
+    problem::Palette,
+    report::prepare,
+    settings::{LaunchSettings, Priority, Restart, ViewSettings},
+};

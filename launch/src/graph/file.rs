@@ -1,0 +1,272 @@
+//! From a file's name to one table: includes, and what the command line changes.
+
+use super::problem::{Problem, Problems};
+use super::settings::{Graph, read_graph};
+use super::source::{Place, Source};
+use super::suggest::hint;
+use super::tree::{Content, Entry, Node, Table, parse, parse_value};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What the command line changes in a graph.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct Overrides {
+    /// `role.key=value`: parameters, `run`, and `role.launch.key`.
+    pub(crate) set: Vec<String>,
+    /// `role=binary`: other binaries for roles.
+    pub(crate) swap: Vec<String>,
+    /// Roles that are left out.
+    pub(crate) without: Vec<String>,
+    /// Another seed.
+    pub(crate) seed: Option<u64>,
+    /// Another name for the board.
+    pub(crate) board: Option<String>,
+}
+
+/// Reads a graph file with everything it includes. What is wrong goes to `problems`; the graph is there
+/// unless the mistakes leave nothing to look at.
+pub(crate) fn load(path: &Path, overrides: &Overrides, problems: &mut Problems) -> Option<Graph> {
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(error) => {
+            let message = format!("cannot read the graph file {}: {error}", shown(path));
+            problems.push(Problem::placeless(message, "name a graph file that exists"));
+            return None;
+        }
+    };
+    let source = Source::file(shown(path), text);
+    let mut reader = Reader { problems, open: Vec::new(), done: Vec::new() };
+    let mut table = reader.read(path, &source)?;
+    if reader.problems.refuse() {
+        return None;
+    }
+    if !table.entries.iter().any(|entry| entry.key != "graph") {
+        let help = "add a table for each service, such as [simulator]";
+        problems.push(Problem::error(&Place::top(&source), "this graph has no services", help));
+        return None;
+    }
+    apply(overrides, &mut table, problems);
+    read_graph(path, &source, &table, problems)
+}
+
+/// A path as people would type it: relative to the current folder if it lies within.
+pub(crate) fn shown(path: &Path) -> String {
+    let inside =
+        std::env::current_dir().ok().and_then(|here| path.strip_prefix(here).ok().map(Path::to_owned));
+    let path = inside.unwrap_or_else(|| path.to_owned());
+    path.strip_prefix(".").unwrap_or(&path).display().to_string()
+}
+
+struct Reader<'a> {
+    problems: &'a mut Problems,
+    // The files that are being read, each included by the one before it.
+    open: Vec<(PathBuf, String)>,
+    // The files that were read: two parts may include a third.
+    done: Vec<PathBuf>,
+}
+
+impl Reader<'_> {
+    fn read(&mut self, path: &Path, source: &Arc<Source>) -> Option<Table> {
+        let identity = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        self.open.push((identity.clone(), source.name.clone()));
+        let table = parse(source, self.problems).map(|own| self.with_includes(path, own));
+        self.open.pop();
+        self.done.push(identity);
+        table
+    }
+
+    fn with_includes(&mut self, path: &Path, mut own: Table) -> Table {
+        let mut merged = Table::default();
+        let graph = own.entries.iter_mut().find(|entry| entry.key == "graph");
+        let include = match graph {
+            Some(Entry { value: Node { content: Content::Table(graph), .. }, .. }) => graph.remove("include"),
+            _ => None,
+        };
+        let files = include.map(|entry| self.included_files(&entry)).unwrap_or_default();
+        for item in files {
+            if let Some(part) = self.read_include(path, &item) {
+                self.refuse_siblings(&merged, &part);
+                merge(&mut merged, part);
+            }
+        }
+        merge(&mut merged, own);
+        merged
+    }
+
+    fn included_files(&mut self, entry: &Entry) -> Vec<(String, Place)> {
+        let items = match entry.value.array() {
+            Some(items) => items,
+            None => std::slice::from_ref(&entry.value),
+        };
+        let mut files = Vec::new();
+        for item in items {
+            match item.text() {
+                Some(text) => files.push((text.to_owned(), item.place.clone())),
+                None => self.problems.push(Problem::error(
+                    &item.place,
+                    format!("`include` takes names of files, not {}", item.kind()),
+                    "write include = [\"parts/tof.toml\"]",
+                )),
+            }
+        }
+        files
+    }
+
+    fn read_include(&mut self, including: &Path, (name, place): &(String, Place)) -> Option<Table> {
+        let path = including.parent().unwrap_or(Path::new("")).join(name);
+        let identity = path.canonicalize().unwrap_or_else(|_| path.clone());
+        if let Some(start) = self.open.iter().position(|(open, _)| *open == identity) {
+            let chain: Vec<_> = self.open[start..].iter().map(|(_, name)| name.as_str()).collect();
+            let message = format!("the files include each other: {} -> {}", chain.join(" -> "), chain[0]);
+            self.problems.push(Problem::error(place, message, "remove one of these includes"));
+            return None;
+        }
+        if self.done.contains(&identity) {
+            return None;
+        }
+        match std::fs::read_to_string(&path) {
+            Ok(text) => self.read(&path, &Source::file(shown(&path), text)),
+            Err(error) => {
+                let message = format!("cannot read the included file {}: {error}", shown(&path));
+                let help = "the name counts from the folder of this file";
+                self.problems.push(Problem::error(place, message, help));
+                None
+            }
+        }
+    }
+
+    fn refuse_siblings(&mut self, before: &Table, part: &Table) {
+        for entry in part.entries.iter().filter(|entry| entry.key != "graph") {
+            if let Some(first) = before.get(&entry.key) {
+                let message = format!("[{}] is in two included files", entry.key);
+                let help = "keep one of the two; only the including file may override a table";
+                let problem = Problem::error(&entry.key_place, message, help);
+                self.problems.push(problem.see(&first.key_place, "first here"));
+            }
+        }
+    }
+}
+
+/// Lays `over` on `base`: services key by key, their values as wholes.
+fn merge(base: &mut Table, over: Table) {
+    for entry in over.entries {
+        let known = base.entries.iter_mut().find(|known| known.key == entry.key);
+        match (known, entry) {
+            (
+                Some(Entry { value: Node { content: Content::Table(known), .. }, .. }),
+                Entry { value: Node { content: Content::Table(table), .. }, .. },
+            ) => merge_service(known, table),
+            (_, entry) => base.put(entry),
+        }
+    }
+}
+
+fn merge_service(base: &mut Table, over: Table) {
+    for entry in over.entries {
+        let known = base.entries.iter_mut().find(|known| known.key == entry.key);
+        match (known, entry) {
+            (
+                Some(Entry { key, value: Node { content: Content::Table(known), .. }, .. }),
+                Entry { value: Node { content: Content::Table(table), .. }, .. },
+            ) if matches!(key.as_str(), "launch" | "defaults" | "view") => {
+                table.entries.into_iter().for_each(|entry| known.put(entry));
+            }
+            // Topics from outside add up: each part names those that it needs.
+            (
+                Some(Entry { key, value: Node { content: Content::Array(known), .. }, .. }),
+                Entry { value: Node { content: Content::Array(more), .. }, .. },
+            ) if key == "external" => known.extend(more),
+            (_, entry) => base.put(entry),
+        }
+    }
+}
+
+fn apply(overrides: &Overrides, table: &mut Table, problems: &mut Problems) {
+    for role in &overrides.without {
+        let source = Source::argument("--without", role);
+        let place = Place::new(&source, "--without ".len()..source.text.len());
+        if find_service(table, role, &place, problems) {
+            table.remove(role);
+        }
+    }
+    for swap in &overrides.swap {
+        let source = Source::argument("--swap", swap);
+        let Some(change) = split(&source, "--swap", "role=binary", problems) else { continue };
+        if !find_service(table, &change.path, &change.path_place, problems) {
+            continue;
+        }
+        let place = Place::new(&source, change.value_offset..source.text.len());
+        let content = Content::Text(place.text().to_owned());
+        let value = Node { content, place: place.clone() };
+        put_at(table, &[&change.path, "run"], &change.path_place, value);
+    }
+    for set in &overrides.set {
+        let source = Source::argument("--set", set);
+        let Some(change) = split(&source, "--set", "role.parameter=value", problems) else { continue };
+        let keys: Vec<&str> = change.path.split('.').map(str::trim).collect();
+        let [role, rest @ ..] = keys.as_slice() else { continue };
+        if rest.is_empty() || keys.iter().any(|key| key.is_empty()) {
+            let message = format!("`{}` names no parameter", change.path);
+            let help = format!("write --set {role}.parameter=value");
+            problems.push(Problem::error(&change.path_place, message, help));
+        } else if *role == "graph" || find_service(table, role, &change.path_place, problems) {
+            let value = parse_value(&source, change.value_offset, problems);
+            put_at(table, &keys, &change.path_place, value);
+        }
+    }
+    let values = [
+        ("--seed", "seed", overrides.seed.map(|seed| (seed.to_string(), Content::Number(seed.into())))),
+        ("--board", "name", overrides.board.clone().map(|name| (name.clone(), Content::Text(name)))),
+    ];
+    for (option, key, value) in values {
+        let Some((text, content)) = value else { continue };
+        let source = Source::argument(option, &text);
+        let place = Place::new(&source, option.len() + 1..source.text.len());
+        put_at(table, &["graph", key], &place, Node { content, place: place.clone() });
+    }
+}
+
+struct Change {
+    path: String,
+    path_place: Place,
+    value_offset: usize,
+}
+
+fn split(source: &Arc<Source>, option: &str, form: &str, problems: &mut Problems) -> Option<Change> {
+    let start = option.len() + 1;
+    let Some(equals) = source.text.get(start..).and_then(|text| text.find('=')) else {
+        let place = Place::new(source, start..source.text.len());
+        let message = format!("`{}` has no `=`", place.text());
+        problems.push(Problem::error(&place, message, format!("write {option} {form}")));
+        return None;
+    };
+    let path_place = Place::new(source, start..start + equals);
+    let path = path_place.text().trim().to_owned();
+    Some(Change { path, path_place, value_offset: start + equals + 1 })
+}
+
+fn find_service(table: &Table, role: &str, place: &Place, problems: &mut Problems) -> bool {
+    let known = table.entries.iter().map(|entry| entry.key.as_str()).filter(|key| *key != "graph");
+    if known.clone().any(|key| key == role) {
+        return true;
+    }
+    let message = format!("the graph has no service `{role}`");
+    problems.push(Problem::error(place, message, hint(role, known, "services")));
+    false
+}
+
+fn put_at(table: &mut Table, keys: &[&str], key_place: &Place, value: Node) {
+    let [key, rest @ ..] = keys else { return };
+    if rest.is_empty() {
+        table.put(Entry { key: (*key).to_owned(), key_place: key_place.clone(), value });
+        return;
+    }
+    if table.get(key).is_none_or(|entry| entry.value.table().is_none()) {
+        let empty = Node { content: Content::Table(Table::default()), place: key_place.clone() };
+        table.put(Entry { key: (*key).to_owned(), key_place: key_place.clone(), value: empty });
+    }
+    let inner = table.entries.iter_mut().find(|entry| entry.key == *key);
+    if let Some(Entry { value: Node { content: Content::Table(inner), .. }, .. }) = inner {
+        put_at(inner, rest, key_place, value);
+    }
+}

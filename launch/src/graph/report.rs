@@ -1,0 +1,120 @@
+//! From a graph's name to its verdict, on the screen or as JSON.
+
+use super::binaries::{Installed, processors, services_in_checkout};
+use super::build::build;
+use super::check::{Checked, check};
+use super::diagram::{dot, mermaid};
+use super::file::{Overrides, load, shown};
+use super::find::find;
+use super::problem::{Palette, Problem, Problems, Severity};
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+/// Which graph is meant, and what is different about it this time.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Request {
+    /// A name or a path.
+    pub(crate) graph: String,
+    /// What the command line changes.
+    pub(crate) overrides: Overrides,
+    /// Whether a source checkout is built first.
+    pub(crate) build: bool,
+}
+
+/// Reads and checks a graph and prints what is wrong to stderr; `None` if it is refused. Starts no process but those that ask each
+/// binary for its interface.
+pub(crate) fn prepare(request: &Request) -> Option<Checked> {
+    let mut problems = Problems::default();
+    let checked = examine(request, &mut problems);
+    eprint!("{}", listing(&problems, &Palette::of(&std::io::stderr()), false));
+    checked
+}
+
+/// `launch check`.
+pub(crate) fn check_command(request: &Request, as_json: bool) -> ExitCode {
+    let mut problems = Problems::default();
+    let checked = examine(request, &mut problems);
+    if as_json {
+        let list: Vec<_> = problems.sorted().into_iter().map(Problem::to_json).collect();
+        println!("{:#}", serde_json::json!({ "ok": checked.is_some(), "problems": list, "graph": checked }));
+    } else {
+        eprint!("{}", listing(&problems, &Palette::of(&std::io::stderr()), true));
+        if let Some(checked) = &checked {
+            print!("{}", praise(checked, &Palette::of(&std::io::stdout())));
+        }
+    }
+    if checked.is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// `launch graph`.
+pub(crate) fn graph_command(request: &Request, as_dot: bool) -> ExitCode {
+    let Some(checked) = prepare(request) else { return ExitCode::FAILURE };
+    print!("{}", if as_dot { dot(&checked) } else { mermaid(&checked) });
+    ExitCode::SUCCESS
+}
+
+fn examine(request: &Request, problems: &mut Problems) -> Option<Checked> {
+    let path = match find(&request.graph) {
+        Ok(path) => path,
+        Err(unknown) => {
+            problems.push(Problem::placeless(unknown.to_string(), unknown.help()));
+            return None;
+        }
+    };
+    let graph = load(&path, &request.overrides, problems)?;
+    let mut built = HashMap::new();
+    if request.build {
+        let in_checkout = services_in_checkout();
+        let mut wanted: Vec<_> = graph.services.iter().map(|service| service.run.clone()).collect();
+        wanted.retain(|run| in_checkout.contains(run));
+        wanted.sort();
+        wanted.dedup();
+        match build(&wanted) {
+            Ok(binaries) => built = binaries,
+            Err(error) => {
+                problems.push(Problem::placeless(error.to_string(), "correct what the compiler says"));
+                return None;
+            }
+        }
+    }
+    let binaries = Installed { folder: graph.folder.clone(), built };
+    check(&graph, &binaries, processors(), problems)
+}
+
+fn listing(problems: &Problems, palette: &Palette, with_notes: bool) -> String {
+    let mut out = String::new();
+    let list = problems.sorted();
+    let errors = list.iter().filter(|problem| problem.severity == Severity::Error).count();
+    for problem in &list {
+        match problem.severity {
+            Severity::Error => {
+                let _ = writeln!(out, "{}", problem.render(palette));
+            }
+            // Notes are a line each: nothing has to be done.
+            Severity::Note if with_notes => {
+                let place = problem.place.as_ref().map(|place| format!("{place}: ")).unwrap_or_default();
+                let _ = writeln!(out, "{place}{}: {}", palette.paint(palette.note, "note"), problem.message);
+            }
+            Severity::Note => {}
+        }
+    }
+    if errors > 0 {
+        let count = if errors == 1 { "1 error".to_owned() } else { format!("{errors} errors") };
+        let _ = writeln!(out, "{}; no process was started", palette.paint(palette.error, &count));
+    }
+    out
+}
+
+fn praise(checked: &Checked, palette: &Palette) -> String {
+    let mut out = String::new();
+    let (services, topics) = (checked.services.len(), checked.topics.len());
+    let _ = writeln!(
+        out,
+        "{} {}: {services} services, {topics} topics, seed {}",
+        palette.paint(palette.good, "in order"),
+        palette.paint(palette.strong, &shown(&checked.file)),
+        checked.seed
+    );
+    out
+}

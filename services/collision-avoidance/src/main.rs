@@ -1,0 +1,32 @@
+//! The process around `collision_avoidance`.
+use collision_avoidance::{CollisionAvoidance, Inputs, Params, Sensor};
+use messages::{Clearance, Odometry, RangeScan, TofRanges};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    board::run(board::about!(), |node, params: Params| {
+        // One of the two sensors is needed, and the other is not even looked at.
+        let (mut ranges, mut scan) = match params.sensor {
+            Sensor::Tof => (Some(node.latest::<TofRanges>("tof/ranges")?), None),
+            Sensor::Laser => (None, Some(node.latest::<RangeScan>("laser/scan")?)),
+        };
+        let mut odometry = node.optional_reference::<Odometry>("wheels/odometry")?;
+        let mut clearance = node.publisher::<Clearance>("safety/clearance")?;
+        if let Some(ranges) = &ranges {
+            node.wake_on(ranges);
+        }
+        if let Some(scan) = &scan {
+            node.wake_on(scan);
+        }
+        node.every(params.period());
+        let mut guard = CollisionAvoidance::new(params)?;
+        Ok(move |now| {
+            let inputs = Inputs {
+                ranges: ranges.as_mut().and_then(|ranges| ranges.read()),
+                scan: scan.as_mut().and_then(|scan| scan.read()),
+                odometry: odometry.read(),
+            };
+            clearance.publish(&guard.step(now, inputs).clearance);
+        })
+    })
+}

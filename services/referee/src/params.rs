@@ -1,0 +1,141 @@
+//! The parameters of the referee.
+
+use geometry::WorldError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// What is judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// Coffee is delivered: against `world/truth`.
+    #[default]
+    Delivery,
+    /// A robot is located in a log: `location/pose` against `truth/pose`.
+    Localisation,
+}
+
+/// The parameters of the referee.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Params {
+    /// What is judged.
+    pub mode: Mode,
+    /// The world file, relative to the working directory; empty for an empty plane.
+    pub world: String,
+    /// The truth is looked at so often.
+    #[schemars(range(min = 10, max = 1000))]
+    pub sample_ms: u32,
+    /// A summary is published so often.
+    #[schemars(range(min = 10, max = 10000))]
+    pub period_ms: u32,
+    /// Deliveries after which the run has passed.
+    #[schemars(range(min = 1, max = 1000))]
+    pub deliveries: u32,
+    /// How far from the door's centre line, along the hallway, the robot may halt.
+    #[schemars(range(min = 0.001, max = 5.0))]
+    pub max_halt_error_m: f64,
+    /// After so long the run has failed; 0 for no limit.
+    #[schemars(range(min = 0.0, max = 1000000.0))]
+    pub time_limit_s: f64,
+    /// So long the mission may report a fault.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub fault_limit_s: f64,
+    /// Median error of the localisation that passes.
+    #[schemars(range(min = 0.001, max = 100.0))]
+    pub max_median_m: f64,
+    /// Error that 95 % of the poses must stay below.
+    #[schemars(range(min = 0.001, max = 100.0))]
+    pub max_p95_m: f64,
+    /// Length of the robot's body.
+    #[schemars(range(min = 0.05, max = 2.0))]
+    pub body_length_m: f64,
+    /// Width of the robot's body.
+    #[schemars(range(min = 0.05, max = 2.0))]
+    pub body_width_m: f64,
+    /// Height of the robot's body.
+    #[schemars(range(min = 0.05, max = 3.0))]
+    pub body_height_m: f64,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            mode: Mode::Delivery,
+            world: String::new(),
+            sample_ms: 50,
+            period_ms: 200,
+            deliveries: 1,
+            max_halt_error_m: 0.10,
+            time_limit_s: 600.0,
+            fault_limit_s: 10.0,
+            max_median_m: 0.25,
+            max_p95_m: 0.8,
+            body_length_m: 0.61,
+            body_width_m: 0.51,
+            body_height_m: 1.0,
+        }
+    }
+}
+
+/// Why parameters of the referee are refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ParamsError {
+    /// A number outside of what is possible.
+    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Smallest possible value.
+        min: f64,
+        /// Largest possible value.
+        max: f64,
+    },
+    /// A bound on the many below that on the half.
+    #[error("max_p95_m = {p95_m} is below max_median_m = {median_m}; raise the first")]
+    BoundsCross {
+        /// The bound on 95 %.
+        p95_m: f64,
+        /// The bound on the median.
+        median_m: f64,
+    },
+    /// The world file cannot be used.
+    #[error("world: {0}")]
+    World(#[from] WorldError),
+}
+
+impl Params {
+    /// From look to look.
+    pub fn sample_period(&self) -> Duration {
+        Duration::from_millis(self.sample_ms.into())
+    }
+}
+
+impl messages::Parameters for Params {
+    type Error = ParamsError;
+
+    fn check(&self) -> Result<(), ParamsError> {
+        within("sample_ms", self.sample_ms.into(), 10.0, 1000.0)?;
+        within("period_ms", self.period_ms.into(), 10.0, 10_000.0)?;
+        within("deliveries", self.deliveries.into(), 1.0, 1000.0)?;
+        within("max_halt_error_m", self.max_halt_error_m, 0.001, 5.0)?;
+        within("time_limit_s", self.time_limit_s, 0.0, 1e6)?;
+        within("fault_limit_s", self.fault_limit_s, 0.0, 1000.0)?;
+        within("max_median_m", self.max_median_m, 0.001, 100.0)?;
+        within("max_p95_m", self.max_p95_m, 0.001, 100.0)?;
+        within("body_length_m", self.body_length_m, 0.05, 2.0)?;
+        within("body_width_m", self.body_width_m, 0.05, 2.0)?;
+        within("body_height_m", self.body_height_m, 0.05, 3.0)?;
+        if self.max_p95_m < self.max_median_m {
+            return Err(ParamsError::BoundsCross { p95_m: self.max_p95_m, median_m: self.max_median_m });
+        }
+        Ok(())
+    }
+}
+
+fn within(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), ParamsError> {
+    if (min..=max).contains(&value) { Ok(()) } else { Err(ParamsError::OutOfRange { name, value, min, max }) }
+}

@@ -1,0 +1,142 @@
+//! The parameters of the tag driver.
+
+use crate::{DeviceError, SimulatedTag, TagDevice};
+use geometry::WorldError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// What measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Device {
+    /// A tag that looks at `world/truth`.
+    #[default]
+    Simulated,
+}
+
+/// The parameters of the tag driver.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Params {
+    /// What measures.
+    pub device: Device,
+    /// The world file with the anchors, relative to the working directory; empty for none.
+    pub world: String,
+    /// From message to message; the module manages ten a second.
+    #[schemars(range(min = 100, max = 10000))]
+    pub period_ms: u32,
+    /// Farther anchors are not heard.
+    #[schemars(range(min = 1.0, max = 200.0))]
+    pub reach_m: f64,
+    /// Standard deviation of a distance.
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub sigma_m: f64,
+    /// The share of distances that are wrong.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub outlier_fraction: f64,
+    /// By how much those are too long, as radio that came a longer way.
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub outlier_m: f64,
+    /// The share of distances that are missing.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub drop_out_fraction: f64,
+    /// Anchors that are never heard, by number.
+    pub dead_anchors: Vec<u32>,
+    /// Where the antenna sits in the robot's frame: forward,
+    #[schemars(range(min = -2.0, max = 2.0))]
+    pub antenna_x_m: f64,
+    /// to the left,
+    #[schemars(range(min = -2.0, max = 2.0))]
+    pub antenna_y_m: f64,
+    /// and above the floor.
+    #[schemars(range(min = 0.0, max = 3.0))]
+    pub antenna_z_m: f64,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            device: Device::Simulated,
+            world: String::new(),
+            period_ms: 100,
+            reach_m: 20.0,
+            sigma_m: 0.10,
+            outlier_fraction: 0.02,
+            outlier_m: 1.0,
+            drop_out_fraction: 0.02,
+            dead_anchors: Vec::new(),
+            antenna_x_m: 0.0,
+            antenna_y_m: 0.0,
+            antenna_z_m: 1.0,
+        }
+    }
+}
+
+/// Why parameters of the tag driver are refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ParamsError {
+    /// A number outside of what is possible.
+    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Smallest possible value.
+        min: f64,
+        /// Largest possible value.
+        max: f64,
+    },
+    /// A dead anchor that the world does not have: surely a slip of the pen.
+    #[error("dead_anchors names {id:#06x}, which the world {world:?} does not have; correct the number")]
+    NoSuchAnchor {
+        /// The number.
+        id: u32,
+        /// The world file.
+        world: String,
+    },
+    /// The world file cannot be used.
+    #[error("world: {0}")]
+    World(#[from] WorldError),
+    /// The device does not answer.
+    #[error("device: {0}")]
+    Device(#[from] DeviceError),
+}
+
+impl Params {
+    /// From message to message.
+    pub fn period(&self) -> Duration {
+        Duration::from_millis(self.period_ms.into())
+    }
+
+    /// The tag that they name. `seed` is for a simulated one.
+    ///
+    /// # Errors
+    /// When the world file cannot be used, or has no anchor that `dead_anchors` names.
+    pub fn open_device(&self, seed: u64) -> Result<Box<dyn TagDevice>, ParamsError> {
+        match self.device {
+            Device::Simulated => Ok(Box::new(SimulatedTag::new(self.clone(), seed)?)),
+        }
+    }
+}
+
+impl messages::Parameters for Params {
+    type Error = ParamsError;
+
+    fn check(&self) -> Result<(), ParamsError> {
+        within("period_ms", self.period_ms.into(), 100.0, 10_000.0)?;
+        within("reach_m", self.reach_m, 1.0, 200.0)?;
+        within("sigma_m", self.sigma_m, 0.0, 2.0)?;
+        within("outlier_fraction", self.outlier_fraction, 0.0, 1.0)?;
+        within("outlier_m", self.outlier_m, 0.0, 20.0)?;
+        within("drop_out_fraction", self.drop_out_fraction, 0.0, 1.0)?;
+        within("antenna_x_m", self.antenna_x_m, -2.0, 2.0)?;
+        within("antenna_y_m", self.antenna_y_m, -2.0, 2.0)?;
+        within("antenna_z_m", self.antenna_z_m, 0.0, 3.0)
+    }
+}
+
+fn within(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), ParamsError> {
+    if (min..=max).contains(&value) { Ok(()) } else { Err(ParamsError::OutOfRange { name, value, min, max }) }
+}
