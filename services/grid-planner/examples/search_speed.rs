@@ -5,24 +5,12 @@ use std::time::Instant;
 
 /// Rooms of 5 m by 4 m with doors, and boxes in them, from a fixed sequence of numbers.
 fn office(cells: usize) -> Grid {
-    let mut grid = Grid::new(cells, cells, 0.05, [0.0, 0.0]);
     let mut state = 7_u64;
     let mut draw = |below: u64| {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((state >> 33) % below) as i64
     };
     let end = cells as i64;
-    for wall in (0..end).step_by(100) {
-        for at in 0..end {
-            grid.occupy(wall, at);
-        }
-    }
-    for wall in (0..end).step_by(80) {
-        for at in 0..end {
-            grid.occupy(at, wall);
-        }
-    }
-    let mut free = grid.clone();
     let mut gaps = Vec::new();
     for x in (100..end).step_by(100) {
         for y in (0..end).step_by(80) {
@@ -36,8 +24,7 @@ fn office(cells: usize) -> Grid {
             gaps.extend((at..at + 22).map(|column| (column, y)));
         }
     }
-    // A grid forgets nothing, so the walls are drawn again without the gaps.
-    free = Grid::new(free.width(), free.height(), 0.05, [0.0, 0.0]);
+    let mut free = Grid::new(cells, cells, 0.05, [0.0, 0.0]);
     let open: std::collections::HashSet<_> = gaps.into_iter().collect();
     for row in 0..end {
         for column in 0..end {

@@ -145,8 +145,10 @@ impl Field {
     pub fn line_cost(&self, from: [f64; 2], to: [f64; 2]) -> Option<f64> {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let length = dx.hypot(dy);
-        let eighth = (dy.atan2(dx) / std::f64::consts::FRAC_PI_4).round();
-        let direction = (eighth as i64).rem_euclid(8) as usize;
+        // Between two of the eight directions the extra cost is interpolated.
+        let eighths = dy.atan2(dx) / std::f64::consts::FRAC_PI_4;
+        let (below, beyond) = (eighths.floor(), eighths - eighths.floor());
+        let direction = (below as i64).rem_euclid(8) as usize;
         let mut weighted = 0.0;
         let reached = line::pieces(from, to, |column, row, share| {
             let Some(cell) = self.grid.checked_index(column, row) else { return false };
@@ -154,7 +156,9 @@ impl Field {
                 return false;
             }
             if self.has_costs {
-                weighted += share * f64::from(self.extra[cell][direction]);
+                let extra = &self.extra[cell];
+                let (low, high) = (f64::from(extra[direction]), f64::from(extra[(direction + 1) % 8]));
+                weighted += share * (low + (high - low) * beyond);
             }
             true
         });

@@ -1,9 +1,9 @@
-//! The grids of a building's floors, from its world file.
+//! The grids of a building's floors, from its world file or from a map file.
 
 use crate::grid::Grid;
 use crate::params::{Params, ParamsError};
 use geometry::world::DoorGeometry;
-use geometry::{Point2, World};
+use geometry::{OccupancyGrid, Point2, World};
 
 /// Free cells around the outermost walls, in metres.
 const MARGIN_M: f64 = 0.5;
@@ -14,6 +14,25 @@ const CELLS_MAX: f64 = 16e6;
 /// place inside; elevators are open, as the mission waits for their doors.
 pub(crate) fn grids(world: &World, params: &Params) -> Result<Vec<(i32, Grid)>, ParamsError> {
     world.floors.iter().map(|floor| Ok((floor.number, grid(world, floor.number, params)?))).collect()
+}
+
+/// The grid of a map file: a cell is free when its freeness (0 occupied, 0.5 unknown, 1 free) is above the threshold.
+pub(crate) fn grid_of_map(params: &Params) -> Result<Grid, ParamsError> {
+    let map = OccupancyGrid::load(&params.map)?;
+    let frame = map.frame();
+    let origin = frame.origin();
+    if origin.heading_rad.abs() > 1e-9 {
+        return Err(ParamsError::TurnedMap { map: params.map.clone(), yaw_rad: origin.heading_rad });
+    }
+    let (width, height) = (frame.width() as usize, frame.height() as usize);
+    let mut grid = Grid::new(width, height, frame.resolution_m(), [origin.x_m, origin.y_m]);
+    for (at, occupancy) in map.as_slice().iter().enumerate() {
+        let freeness = 1.0 - occupancy.probability().unwrap_or(0.5);
+        if freeness <= params.occupancy_threshold {
+            grid.occupy((at % width) as i64, (at / width) as i64);
+        }
+    }
+    Ok(grid)
 }
 
 fn grid(world: &World, floor: i32, params: &Params) -> Result<Grid, ParamsError> {

@@ -5,8 +5,8 @@ use std::f64::consts::SQRT_2;
 
 /// Free cells in a row count up to here.
 const FAR: u16 = 4000;
-/// A passage is a hallway where it is this much longer than wide.
-const SLENDER: f64 = 2.0;
+/// A passage is a hallway where it is this much longer than wide; an elevator with the hallway before its door is none.
+const SLENDER: f64 = 3.5;
 /// So near to the lane's middle is in the lane, in metres.
 const TOLERANCE_M: f64 = 0.01;
 
@@ -15,7 +15,8 @@ const TOLERANCE_M: f64 = 0.01;
 /// hallway's axis is the direction across which the walls are nearest to each other, and at most `width_max_m` apart.
 pub(crate) fn beside_lane(grid: &Grid, lane_m: f64, width_max_m: f64) -> Vec<[f32; 8]> {
     let runs: Vec<Vec<u16>> = (0..8).map(|direction| free_run(grid, direction)).collect();
-    let step_m = |direction: usize| grid.resolution_m() * if direction % 2 == 0 { 1.0 } else { SQRT_2 };
+    let step_m =
+        |direction: usize| grid.resolution_m() * if direction.is_multiple_of(2) { 1.0 } else { SQRT_2 };
     // From the cell's middle to the wall's line, about the middle of its cell; infinite where no wall is.
     let to_wall_m = |cell: usize, direction: usize| match runs[direction][cell] {
         FAR => f64::INFINITY,

@@ -77,10 +77,12 @@ impl GridPlanner {
     /// When a parameter or a file cannot be used.
     pub fn new(params: Params) -> Result<Self, ParamsError> {
         params.check()?;
-        let grids = if params.world.is_empty() {
-            Vec::new()
-        } else {
+        let grids = if !params.map.is_empty() {
+            vec![(params.map_floor, floors::grid_of_map(&params)?)]
+        } else if !params.world.is_empty() {
             floors::grids(&World::load(&params.world)?, &params)?
+        } else {
+            Vec::new()
         };
         Self::with_grids(params, grids)
     }

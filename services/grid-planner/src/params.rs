@@ -2,7 +2,7 @@
 
 use crate::field::Costs;
 use crate::overlay::Rules;
-use geometry::WorldError;
+use geometry::{MapError, WorldError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -24,10 +24,10 @@ pub enum Algorithm {
 pub struct Params {
     /// World file with the floors' walls; empty for none.
     pub world: String,
-    /// Floor that `map_floor` maps belong to; only with a map file.
-    pub map_floor: i32,
-    /// ROS map file (YAML) used instead of the world's walls; empty for none.
+    /// ROS map file (YAML) used instead of a world; empty for none.
     pub map: String,
+    /// The floor that the map file shows.
+    pub map_floor: i32,
     /// A map's cell is free when its freeness (0 occupied, 0.5 unknown, 1 free) is above this (ASN Table 1, X-31).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub occupancy_threshold: f64,
@@ -96,8 +96,8 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             world: String::new(),
-            map_floor: 0,
             map: String::new(),
+            map_floor: 0,
             occupancy_threshold: 0.4,
             algorithm: Algorithm::AnyAngle,
             resolution_m: 0.05,
@@ -149,6 +149,17 @@ pub enum ParamsError {
     /// The world file cannot be used.
     #[error("world: {0}")]
     World(#[from] WorldError),
+    /// The map file cannot be used.
+    #[error("map: {0}")]
+    Map(#[from] MapError),
+    /// A map whose rows do not run along x.
+    #[error("map = \"{map}\" is turned by {yaw_rad} rad: set the yaw in its origin to zero")]
+    TurnedMap {
+        /// The map file.
+        map: String,
+        /// The direction of its rows.
+        yaw_rad: f64,
+    },
     /// A floor whose grid would be too large.
     #[error(
         "floor {floor} needs {cells} cells at resolution_m = {resolution_m}, and {most} are possible: choose larger cells"

@@ -51,7 +51,7 @@ fn steps_length(field: &Field, cells: &[u32]) -> f64 {
         let offset = pair[1] as isize - pair[0] as isize;
         let direction = offsets.iter().position(|&other| other == offset).expect("a step to a neighbour");
         assert!(field.moves()[pair[0] as usize] & (1 << direction) != 0, "a step that is not open");
-        if direction % 2 == 0 { 1.0 } else { SQRT_2 }
+        if direction.is_multiple_of(2) { 1.0 } else { SQRT_2 }
     };
     cells.windows(2).map(step).sum()
 }
@@ -272,7 +272,7 @@ fn oracle(field: &Field, from: usize, to: usize) -> Option<u32> {
             .filter(|direction| open & (1 << direction) != 0)
             .map(move |direction| {
                 let next = cell.wrapping_add_signed(offsets[direction]);
-                let step = if direction % 2 == 0 { STRAIGHT } else { DIAGONAL };
+                let step = if direction.is_multiple_of(2) { STRAIGHT } else { DIAGONAL };
                 let extra = field.extra().get(next).map_or(0, |extra| u32::from(extra[direction]));
                 (next, step + ((step * extra) >> 4))
             })
@@ -285,7 +285,7 @@ fn cost_of(field: &Field, cells: &[u32]) -> u32 {
     let cost = |pair: &[u32]| {
         let offset = pair[1] as isize - pair[0] as isize;
         let direction = field.offsets().iter().position(|&other| other == offset).expect("a neighbour");
-        let step = if direction % 2 == 0 { STRAIGHT } else { DIAGONAL };
+        let step = if direction.is_multiple_of(2) { STRAIGHT } else { DIAGONAL };
         let extra = field.extra().get(pair[1] as usize).map_or(0, |extra| u32::from(extra[direction]));
         step + ((step * extra) >> 4)
     };

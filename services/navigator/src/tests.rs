@@ -263,7 +263,7 @@ proptest! {
         for (round, &time) in times.iter().enumerate() {
             let now = Time::from_nanos(time);
             let int = |at: usize| ints[(at + round) % ints.len()];
-            let number = |at: usize| if (at + round) % 3 == 0 { numbers[(at + round) % numbers.len()] } else { f64::from(int(at) % 30) };
+            let number = |at: usize| if (at + round).is_multiple_of(3) { numbers[(at + round) % numbers.len()] } else { f64::from(int(at) % 30) };
             let room = FixedText::truncated(["207", "302", "213", "x"][round % 4]);
             let order = Order { order_id: int(0).into(), room };
             let pose = PoseEstimate { x_m: number(0), y_m: number(1), heading_rad: number(2), floor: int(1) as i32 % 5, state: LocationState(int(2) % 5), ..PoseEstimate::default() };

@@ -193,6 +193,49 @@ fn a_blocked_hallway_is_said_once_and_planned_when_it_opens() {
     assert!(states.len() <= 6, "it flaps: {states:?}");
 }
 
+fn building() -> GridPlanner {
+    let world = concat!(env!("CARGO_MANIFEST_DIR"), "/../../launch/worlds/cs-building.toml");
+    GridPlanner::new(Params { world: world.to_owned(), ..Params::default() }).unwrap()
+}
+
+#[track_caller]
+fn check_building(floor: i32, from: [f64; 2], to: [f64; 2], longest_m: f64) -> Vec<Waypoint> {
+    let request = PlanRequest { floor, goal_y_m: to[1], ..request(1, to[0]) };
+    let pose = PoseEstimate { floor, ..estimate(from[0], from[1]) };
+    let (path, waypoints) = step(&mut building(), 0, &request, &pose, None).unwrap();
+    assert_eq!(path.state.get().unwrap(), PlanStateName::Found, "{from:?} {to:?}");
+    assert!(path.length_m <= longest_m, "{path:?} {waypoints:?}");
+    waypoints
+}
+
+#[test]
+fn ways_in_the_building() {
+    for floor in [2, 3] {
+        check_building(floor, [3.6, -0.3], [28.0, -0.3], 24.5);
+        check_building(floor, [28.0, 0.3], [3.6, 0.3], 24.5);
+        check_building(floor, [3.6, -0.3], [1.6, 0.15], 2.5);
+        check_building(floor, [1.6, 0.15], [1.6, -1.75], 2.0);
+        check_building(floor, [1.6, -1.75], [12.0, -0.3], 12.0);
+    }
+    check_building(2, [3.6, 2.0], [10.0, -0.3], 7.8);
+    let lane = check_building(2, [3.6, -0.3], [28.0, -0.3], 24.5);
+    assert!(lane.iter().all(|point| (-0.345..=-0.245).contains(&point.y_m)), "{lane:?}");
+}
+
+#[test]
+fn maps_of_another_kind_are_read() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/maps_ros");
+    let params = |map: &str| Params { map: format!("{folder}/{map}"), map_floor: 2, ..Params::default() };
+    if !std::path::Path::new(folder).exists() {
+        println!("skipped: ../shared/data/maps_ros is missing");
+        return;
+    }
+    let planner = GridPlanner::new(params("depot.yaml")).unwrap();
+    let grid = planner.field(2).unwrap().grid();
+    assert!(grid.width() > 100 && grid.occupied().contains(&0));
+    assert!(GridPlanner::new(params("invalid_image.yaml")).is_err());
+}
+
 #[track_caller]
 fn check_params(change: impl Fn(&mut Params), expected: &str) {
     let mut params = Params::default();
