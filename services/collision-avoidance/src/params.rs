@@ -136,7 +136,7 @@ pub enum ParamsError {
         /// Its value.
         radius_m: f64,
         /// The smallest reading.
-        minimum_m: f64,
+        minimum_m: f32,
     },
     /// The memory begins inside the private sphere.
     #[error(
@@ -187,9 +187,9 @@ impl Parameters for Params {
                 return Err(ParamsError::OutOfRange { name, value, min, max });
             }
         }
-        let minimum_m = f64::from(TofRanges::MINIMUM_M);
+        let minimum_m = TofRanges::MINIMUM_M;
         for (name, radius_m, ..) in &ranges[..3] {
-            if self.sensor == Sensor::Tof && *radius_m as f32 <= TofRanges::MINIMUM_M {
+            if self.sensor == Sensor::Tof && *radius_m as f32 <= minimum_m {
                 return Err(ParamsError::RadiusBelowSensor { name, radius_m: *radius_m, minimum_m });
             }
         }

@@ -3,6 +3,7 @@
 use messages::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::time::Duration;
 
 /// Which sensors tell the distance of obstacles. All that are named must be fresh, or the robot stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -24,60 +25,87 @@ pub enum RangeSource {
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// Distance between the wheels, in metres.
+    #[schemars(range(min = 0.05, max = 5.0))]
     pub track_m: f64,
     /// The fastest that a wheel is told to turn; the speeds in the rule files are scaled by it.
+    #[schemars(range(min = 0.01, max = 5.0))]
     pub top_speed_mps: f64,
     /// The top speed for which the rule files are written.
+    #[schemars(range(min = 0.01, max = 5.0))]
     pub rules_top_speed_mps: f64,
     /// The most that a wheel's speed changes in a second, stops apart.
+    #[schemars(range(min = 0.01, max = 20.0))]
     pub acceleration_mps2: f64,
     /// Time between two steps.
+    #[schemars(range(min = 1, max = 1000))]
     pub period_ms: u64,
     /// Poses and ranges older than this stop the robot.
+    #[schemars(range(min = 1, max = 10000))]
     pub input_max_age_ms: u64,
     /// A command older than this stops the robot.
+    #[schemars(range(min = 1, max = 3600000))]
     pub command_max_age_ms: u64,
     /// The last waypoint is reached within this distance.
+    #[schemars(range(min = 0.005, max = 2.0))]
     pub reach_tolerance_m: f64,
     /// An intermediate waypoint is passed within this distance, or when it lies behind.
+    #[schemars(range(min = 0.01, max = 2.0))]
     pub pass_distance_m: f64,
     /// How far ahead on the path the robot aims. 0 aims at the next waypoint, as the paper does.
+    #[schemars(range(min = 0.0, max = 5.0))]
     pub lookahead_m: f64,
     /// Targets, and corners of the path, nearer than this are turned at before driving (ASN-146).
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub rotation_distance_m: f64,
     /// A turn on the spot begins above this error.
+    #[schemars(range(min = 0.01, max = std::f64::consts::PI))]
     pub rotation_begin_rad: f64,
     /// A turn on the spot ends below this error.
+    #[schemars(range(min = 0.005, max = std::f64::consts::PI))]
     pub rotation_end_rad: f64,
     /// Above this error the robot turns on the spot however far the target is; π: never.
+    #[schemars(range(min = 0.01, max = std::f64::consts::PI))]
     pub rotation_always_rad: f64,
     /// The least wheel speed in a turn on the spot.
+    #[schemars(range(min = 0.0))]
     pub rotation_least_mps: f64,
     /// A commanded turn ends below this error.
+    #[schemars(range(min = 0.002, max = 1.0))]
     pub turn_tolerance_rad: f64,
     /// Speed of creeping and of backing off.
+    #[schemars(range(min = 0.005))]
     pub creep_speed_mps: f64,
     /// Which sensors tell the distance of obstacles.
     pub range_source: RangeSource,
     /// Avoidance takes over below this clearance in front.
+    #[schemars(range(min = 0.01, max = 10.0))]
     pub front_trigger_m: f64,
     /// Avoidance takes over below this clearance at the sides; below the corridor's, or the robot shies at every wall.
+    #[schemars(range(min = 0.01, max = 10.0))]
     pub side_trigger_m: f64,
     /// Below this clearance in front the robot brakes at once, and then only turns.
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub brake_distance_m: f64,
     /// By how much clearances beside the laser cones, from 50 to 110 degrees, are stretched.
+    #[schemars(range(min = 1.0, max = 10.0))]
     pub lateral_factor: f64,
     /// This near to the goal there is no avoidance (companions 3.7).
+    #[schemars(range(min = 0.0, max = 10.0))]
     pub goal_without_avoidance_m: f64,
     /// Avoidance for longer than this without progress is reported as blocked (companions 3.8).
+    #[schemars(range(min = 100, max = 3600000))]
     pub blocked_after_ms: u64,
     /// What counts as progress.
+    #[schemars(range(min = 0.01, max = 10.0))]
     pub progress_m: f64,
     /// The hull ahead of the turning centre.
+    #[schemars(range(min = 0.01, max = 5.0))]
     pub hull_front_m: f64,
     /// The hull behind the turning centre.
+    #[schemars(range(min = 0.01, max = 5.0))]
     pub hull_rear_m: f64,
     /// Half of the hull's width.
+    #[schemars(range(min = 0.01, max = 5.0))]
     pub hull_side_m: f64,
     /// A file with the motion controller's rules in FCL; empty for the built-in ones.
     pub motion_rules: String,
@@ -122,6 +150,13 @@ impl Default for Params {
             avoidance_rules: String::new(),
             rotation_rules: String::new(),
         }
+    }
+}
+
+impl Params {
+    /// Time between two steps.
+    pub fn period(&self) -> Duration {
+        Duration::from_millis(self.period_ms)
     }
 }
 

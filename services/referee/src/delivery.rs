@@ -3,8 +3,8 @@
 use crate::{Inputs, Params, errors::Comparison};
 use geometry::{Point2, Polygon, Pose2, World};
 use messages::{
-    AppliedWheels, Clearance, DeliveryStatusName, MissionStatus, RoomName, RunState, RunSummary, Stamped, Surroundings,
-    Time, WorldTruth,
+    AppliedWheels, Clearance, DeliveryStatusName, MissionStatus, RoomName, RunState, RunSummary, Stamped,
+    Surroundings, Time, WorldTruth,
 };
 
 /// Wheels slower than this stand.
@@ -143,7 +143,9 @@ impl Delivery {
     /// Distance from the door's centre line along the wall; infinite when the robot is not at that door at all.
     fn halt_error_m(&self, room: &str, truth: &WorldTruth) -> f64 {
         let geometry = self.world.door(room).filter(|door| door.floor == truth.floor);
-        let Some(geometry) = geometry.and_then(|door| self.world.door_geometry(door)) else { return f64::INFINITY };
+        let Some(geometry) = geometry.and_then(|door| self.world.door_geometry(door)) else {
+            return f64::INFINITY;
+        };
         let offset = Point2::new(truth.x_m, truth.y_m) - geometry.gap.midpoint();
         let across_m = -offset.dot(&geometry.into);
         let along_m = (offset + geometry.into * across_m).norm();
@@ -158,12 +160,17 @@ impl Delivery {
         if self.fault_since.is_some() && faulty_s >= params.fault_limit_s {
             return (RunState::Failed, format!("the mission reports a fault for {faulty_s:.0} s"));
         }
-        if let Some(halt) = self.halts.iter().find(|halt| halt.error_m.is_nan() || halt.error_m > params.max_halt_error_m) {
+        if let Some(halt) =
+            self.halts.iter().find(|halt| halt.error_m.is_nan() || halt.error_m > params.max_halt_error_m)
+        {
             let (room, error_m) = (halt.room, halt.error_m);
             return (RunState::Failed, format!("halted {error_m:.2} m beside the door of {room}"));
         }
         if self.delivered > self.halts.len() as u64 {
-            return (RunState::Failed, "a delivery is reported, but the robot did not stand at the door".to_owned());
+            return (
+                RunState::Failed,
+                "a delivery is reported, but the robot did not stand at the door".to_owned(),
+            );
         }
         if self.delivered >= params.deliveries.into() {
             let rooms: Vec<_> = self.halts.iter().map(|halt| halt.room.to_string()).collect();
@@ -178,7 +185,7 @@ impl Delivery {
     pub(crate) fn write(&self, summary: &mut RunSummary) {
         let worst_halt_m = self.halts.iter().map(|halt| halt.error_m).reduce(f64::max).unwrap_or(f64::NAN);
         summary.push("deliveries", self.delivered as f64, "");
-        summary.push("halt error", worst_halt_m, "m");
+        summary.push("halt distance from door centre", worst_halt_m, "m");
         summary.push("contacts", self.contacts as f64, "");
         summary.push("least clearance", self.least_clearance_m, "m");
         summary.push("stops by the guard", (self.guard_changes.0 / 2) as f64, "");

@@ -13,8 +13,8 @@ pub use params::{Mode, Params, ParamsError};
 use delivery::{Delivery, Ruling};
 use geometry::{Point2, World};
 use messages::{
-    AppliedWheels, Clearance, FixedText, MissionStatus, Parameters, PoseEstimate, RunState, RunSummary, Stamped, Time,
-    TruePose, WorldTruth,
+    AppliedWheels, Clearance, FixedText, MissionStatus, Parameters, PoseEstimate, RunState, RunSummary,
+    Stamped, Time, TruePose, WorldTruth,
 };
 
 /// After the last true pose, poses that answer the last readings may still arrive for so long.
@@ -129,7 +129,12 @@ impl Referee {
         // Without a single pose both are NaN, and no bound holds.
         let passed = median_m <= max_median_m && p95_m <= max_p95_m;
         let state = if passed { RunState::Passed } else { RunState::Failed };
-        (state, format!("median {median_m:.3} m (bound {max_median_m} m), 95 % {p95_m:.3} m (bound {max_p95_m} m)"))
+        (
+            state,
+            format!(
+                "median {median_m:.3} m (bound {max_median_m} m), 95 % {p95_m:.3} m (bound {max_p95_m} m)"
+            ),
+        )
     }
 
     fn summary(&self, state: RunState, remark: &str) -> RunSummary {
@@ -142,7 +147,11 @@ impl Referee {
                 summary.push("poses compared", comparison.errors.count as f64, "");
                 summary.push("error, median", comparison.errors.quantile_m(0.5), "m");
                 summary.push("error, 95 %", comparison.errors.quantile_m(0.95), "m");
-                summary.push("error, largest", if comparison.errors.count > 0 { comparison.errors.max_m } else { f64::NAN }, "m");
+                summary.push(
+                    "error, largest",
+                    if comparison.errors.count > 0 { comparison.errors.max_m } else { f64::NAN },
+                    "m",
+                );
                 summary.push("ranges accepted", comparison.accepted as f64, "");
                 summary.push("ranges rejected", comparison.rejected as f64, "");
                 summary.push("poses on a wrong floor", comparison.wrong_floor as f64, "");

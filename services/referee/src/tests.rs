@@ -34,7 +34,14 @@ impl Run {
     fn new(params: Params) -> Self {
         let referee = Referee::in_world(params, World::parse(HALLWAY).unwrap()).unwrap();
         let truth = WorldTruth { y_m: -0.35, floor: 2, ..WorldTruth::default() };
-        Self { referee, now_ms: 0, truth, mission: mission(DeliveryStatusName::Idle, 0), clearance: Clearance::default(), last: None }
+        Self {
+            referee,
+            now_ms: 0,
+            truth,
+            mission: mission(DeliveryStatusName::Idle, 0),
+            clearance: Clearance::default(),
+            last: None,
+        }
     }
 
     /// Drives along the hallway to `x_m` within so many seconds.
@@ -86,7 +93,13 @@ impl Run {
 }
 
 fn mission(status: DeliveryStatusName, delivered: u64) -> MissionStatus {
-    MissionStatus { order_id: 1, room: FixedText::new("207").unwrap(), status: status.into(), delivered, ..MissionStatus::default() }
+    MissionStatus {
+        order_id: 1,
+        room: FixedText::new("207").unwrap(),
+        status: status.into(),
+        delivered,
+        ..MissionStatus::default()
+    }
 }
 
 /// A delivery whose robot halts at `halt_x_m`.
@@ -101,7 +114,7 @@ fn delivery(halt_x_m: f64) -> Run {
 fn a_good_delivery_passes() {
     let run = delivery(10.06);
     run.expect(RunState::Passed, "delivered to 207");
-    assert!((run.figure("halt error") - 0.06).abs() < 1e-6);
+    assert!((run.figure("halt distance from door centre") - 0.06).abs() < 1e-6);
     assert!((run.figure("path length") - 10.06).abs() < 0.02);
     assert!((run.figure("least clearance") - 0.245).abs() < 1e-6, "{}", run.figure("least clearance"));
     assert_eq!((run.figure("contacts"), run.figure("deliveries")), (0.0, 1.0));
@@ -119,7 +132,11 @@ fn halting_beside_the_door_fails() {
 fn another_floor_is_not_the_door() {
     let mut run = Run::new(Params::default());
     run.truth.floor = 3;
-    run.drive_to(10.0, 10.0).status(DeliveryStatusName::AtDoor, 0, 1.0).status(DeliveryStatusName::Delivered, 1, 0.5);
+    run.drive_to(10.0, 10.0).status(DeliveryStatusName::AtDoor, 0, 1.0).status(
+        DeliveryStatusName::Delivered,
+        1,
+        0.5,
+    );
     run.expect(RunState::Failed, "halted inf m");
 }
 
@@ -138,7 +155,11 @@ fn a_contact_fails_at_once_and_for_good() {
     run.drive_to(2.1, 0.1);
     run.expect(RunState::Failed, "touched something 1 times");
     run.truth.contacts = 0;
-    run.drive_to(10.0, 5.0).status(DeliveryStatusName::AtDoor, 0, 1.0).status(DeliveryStatusName::Delivered, 1, 0.5);
+    run.drive_to(10.0, 5.0).status(DeliveryStatusName::AtDoor, 0, 1.0).status(
+        DeliveryStatusName::Delivered,
+        1,
+        0.5,
+    );
     run.expect(RunState::Failed, "touched something");
 }
 
@@ -170,7 +191,9 @@ impl Run {
 #[test]
 fn a_lasting_fault_fails_and_a_short_one_does_not() {
     let mut run = Run::new(Params::default());
-    run.status(DeliveryStatusName::Fault, 0, 9.0).status(DeliveryStatusName::Travelling, 0, 1.0).expect_running();
+    run.status(DeliveryStatusName::Fault, 0, 9.0)
+        .status(DeliveryStatusName::Travelling, 0, 1.0)
+        .expect_running();
     run.status(DeliveryStatusName::Fault, 0, 9.9).expect_running();
     run.status(DeliveryStatusName::Fault, 0, 1.0);
     run.expect(RunState::Failed, "reports a fault for 10 s");
@@ -179,10 +202,17 @@ fn a_lasting_fault_fails_and_a_short_one_does_not() {
 #[test]
 fn several_deliveries_are_awaited_and_the_worst_halt_counts() {
     let mut run = Run::new(Params { deliveries: 2, ..Params::default() });
-    run.drive_to(10.02, 10.0).status(DeliveryStatusName::AtDoor, 0, 1.0).status(DeliveryStatusName::Returning, 1, 1.0).expect_running();
-    run.drive_to(3.0, 10.0).drive_to(9.95, 10.0).status(DeliveryStatusName::AtDoor, 1, 1.0).status(DeliveryStatusName::Returning, 2, 0.5);
+    run.drive_to(10.02, 10.0)
+        .status(DeliveryStatusName::AtDoor, 0, 1.0)
+        .status(DeliveryStatusName::Returning, 1, 1.0)
+        .expect_running();
+    run.drive_to(3.0, 10.0).drive_to(9.95, 10.0).status(DeliveryStatusName::AtDoor, 1, 1.0).status(
+        DeliveryStatusName::Returning,
+        2,
+        0.5,
+    );
     run.expect(RunState::Passed, "207, 207");
-    assert!((run.figure("halt error") - 0.05).abs() < 1e-6);
+    assert!((run.figure("halt distance from door centre") - 0.05).abs() < 1e-6);
 }
 
 #[test]
@@ -190,7 +220,12 @@ fn stops_of_the_guard_are_counted_over_its_restarts() {
     let mut run = Run::new(Params::default());
     let mut changes = |count: u64| {
         let verdict = if count % 2 == 1 { Verdict::Go } else { Verdict::Stop };
-        run.clearance = Clearance { signal: verdict.into(), reason: GuardReasonName::Clear.into(), changes: count, ..Clearance::default() };
+        run.clearance = Clearance {
+            signal: verdict.into(),
+            reason: GuardReasonName::Clear.into(),
+            changes: count,
+            ..Clearance::default()
+        };
         run.drive_to(0.0, 0.3);
         run.figure("stops by the guard")
     };
@@ -227,11 +262,17 @@ fn log(error_m: impl Fn(u64) -> f64, params: Params) -> Run {
         let now = at(ms);
         let newest_truth = (ms / 100 * 100).min(10_000);
         let newest_pose = (ms.saturating_sub(30) / 100 * 100 + 30).min(9_930);
-        let truth = TruePose { x_m: newest_truth as f64 * 1e-3, is_last: u32::from(newest_truth == 10_000), ..TruePose::default() };
-        let pose = estimate(newest_pose as f64 * 1e-3 + error_m(newest_pose / 100), LocationStateName::Tracking);
+        let truth = TruePose {
+            x_m: newest_truth as f64 * 1e-3,
+            is_last: u32::from(newest_truth == 10_000),
+            ..TruePose::default()
+        };
+        let pose =
+            estimate(newest_pose as f64 * 1e-3 + error_m(newest_pose / 100), LocationStateName::Tracking);
         let inputs = Inputs {
             true_pose: Some(Stamped::new(at(newest_truth), &truth)),
-            location: (ms >= 30).then(|| Stamped { sequence: newest_pose, ..Stamped::new(at(newest_pose), &pose) }),
+            location: (ms >= 30)
+                .then(|| Stamped { sequence: newest_pose, ..Stamped::new(at(newest_pose), &pose) }),
             ..Inputs::default()
         };
         run.last = run.referee.step(now, inputs).summary.or(run.last);
@@ -246,10 +287,13 @@ fn a_log_is_judged_by_quantiles_at_its_end() {
     run.expect(RunState::Passed, "median 0.1");
     assert_eq!(run.figure("poses compared"), 100.0);
     assert!((run.figure("error, median") - 0.1).abs() < 0.0015);
-    assert!((run.figure("error, 95 %") - 0.5).abs() < 0.0015 && (run.figure("error, largest") - 0.5).abs() < 1e-9);
+    assert!(
+        (run.figure("error, 95 %") - 0.5).abs() < 0.0015 && (run.figure("error, largest") - 0.5).abs() < 1e-9
+    );
     assert_eq!((run.figure("ranges accepted"), run.figure("ranges rejected")), (40.0, 2.0));
     log(|_| 0.26, Params::default()).expect(RunState::Failed, "median 0.26");
-    log(|index| if index % 10 == 0 { 0.9 } else { 0.1 }, Params::default()).expect(RunState::Failed, "95 % 0.9");
+    log(|index| if index % 10 == 0 { 0.9 } else { 0.1 }, Params::default())
+        .expect(RunState::Failed, "95 % 0.9");
     log(|_| f64::NAN, Params::default()).expect(RunState::Failed, "median NaN");
 }
 

@@ -138,9 +138,5 @@ impl messages::Parameters for Params {
 }
 
 fn within(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), ParamsError> {
-    if (min..=max).contains(&value) {
-        Ok(())
-    } else {
-        Err(ParamsError::OutOfRange { name, value, min, max })
-    }
+    if (min..=max).contains(&value) { Ok(()) } else { Err(ParamsError::OutOfRange { name, value, min, max }) }
 }

@@ -122,7 +122,8 @@ impl TagDevice for SimulatedTag {
         let middle = heard.heard().iter().fold(Point2::origin(), |sum, anchor| {
             sum + geometry::Vector2::new(anchor.x_m, anchor.y_m) / count.max(1) as f64
         });
-        self.position = position_from(heard.heard(), height_m, last.unwrap_or(middle)).map(|place| (truth.floor, place));
+        self.position =
+            position_from(heard.heard(), height_m, last.unwrap_or(middle)).map(|place| (truth.floor, place));
         if let Some((_, place)) = self.position {
             (heard.x_m, heard.y_m, heard.z_m) = (place.x, place.y, height_m);
             heard.has_position = 1;

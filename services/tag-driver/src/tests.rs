@@ -4,11 +4,19 @@ use proptest::prelude::*;
 
 /// Five anchors on floor 2, one on floor 3.
 fn world() -> World {
-    let anchors = [(1, 2, 0.0, 3.0), (2, 2, 5.0, -3.0), (3, 2, 10.0, 3.0), (4, 2, 15.0, -3.0), (5, 2, 60.0, 0.0), (6, 3, 0.0, 0.0)];
+    let anchors = [
+        (1, 2, 0.0, 3.0),
+        (2, 2, 5.0, -3.0),
+        (3, 2, 10.0, 3.0),
+        (4, 2, 15.0, -3.0),
+        (5, 2, 60.0, 0.0),
+        (6, 3, 0.0, 0.0),
+    ];
     let anchors = anchors.map(|(id, floor, x, y)| {
         format!("[[anchor]]\nid = {id}\nfloor = {floor}\nx_m = {x:?}\ny_m = {y:?}\nz_m = 2.2\n")
     });
-    World::parse(&format!("name = \"w\"\n[[floor]]\nnumber = 2\n[[floor]]\nnumber = 3\n{}", anchors.concat())).unwrap()
+    World::parse(&format!("name = \"w\"\n[[floor]]\nnumber = 2\n[[floor]]\nnumber = 3\n{}", anchors.concat()))
+        .unwrap()
 }
 
 fn at(ms: u64) -> Time {
@@ -72,8 +80,10 @@ fn errors_are_as_many_and_as_large_as_the_parameters_say() {
     let exact = read(&mut self::tag(clean()), &place);
     let exact_m = |id: u32| exact.heard().iter().find(|anchor| anchor.id == id).unwrap().range_m;
     let frames: Vec<TagRanges> = (0..3000).map(|_| read(&mut tag, &place)).collect();
-    let errors: Vec<f64> =
-        frames.iter().flat_map(|frame| frame.heard().iter().map(|a| a.range_m - exact_m(a.id)).collect::<Vec<_>>()).collect();
+    let errors: Vec<f64> = frames
+        .iter()
+        .flat_map(|frame| frame.heard().iter().map(|a| a.range_m - exact_m(a.id)).collect::<Vec<_>>())
+        .collect();
     let missing = 1.0 - errors.len() as f64 / 12_000.0;
     assert!((0.085..0.115).contains(&missing), "{missing}");
     let (wrong, right): (Vec<f64>, Vec<f64>) = errors.iter().partition(|error| error.abs() > 0.5);
@@ -81,8 +91,12 @@ fn errors_are_as_many_and_as_large_as_the_parameters_say() {
     assert!((wrong.iter().sum::<f64>() / wrong.len() as f64 - 1.0).abs() < 0.03);
     let sigma = (right.iter().map(|error| error * error).sum::<f64>() / right.len() as f64).sqrt();
     assert!((0.097..0.103).contains(&sigma), "{sigma}");
-    let qualities = frames.iter().flat_map(|frame| frame.heard().iter().map(|a| a.quality_percent).collect::<Vec<_>>());
-    assert!(qualities.clone().all(|quality| (40.0..=90.0).contains(&quality)) && qualities.clone().any(|quality| quality > 85.0));
+    let qualities =
+        frames.iter().flat_map(|frame| frame.heard().iter().map(|a| a.quality_percent).collect::<Vec<_>>());
+    assert!(
+        qualities.clone().all(|quality| (40.0..=90.0).contains(&quality))
+            && qualities.clone().any(|quality| quality > 85.0)
+    );
 }
 
 #[test]
@@ -92,7 +106,9 @@ fn the_modules_own_position_is_good_to_a_few_decimetres() {
         .map(|step| {
             let place = truth(1.0 + f64::from(step) * 0.02, 0.5, 2);
             let ranges = read(&mut tag, &place);
-            if ranges.has_position == 0 { return 0.0; }
+            if ranges.has_position == 0 {
+                return 0.0;
+            }
             (Point2::new(ranges.x_m, ranges.y_m) - Point2::new(place.x_m, place.y_m)).norm()
         })
         .collect();
@@ -112,7 +128,9 @@ fn silent_before_the_first_truth_and_after_the_last() {
 
 #[test]
 fn one_seed_one_noise() {
-    let run = |seed| read(&mut SimulatedTag::in_world(Params::default(), &world(), seed).unwrap(), &truth(1.0, 0.0, 2));
+    let run = |seed| {
+        read(&mut SimulatedTag::in_world(Params::default(), &world(), seed).unwrap(), &truth(1.0, 0.0, 2))
+    };
     assert_eq!(run(1), run(1));
     assert_ne!(run(1), run(2));
 }

@@ -89,8 +89,5 @@ impl TofDriver {
 }
 
 /// A frame in which every sensor reports a hardware failure (status 5).
-pub const ALL_BROKEN: TofRanges = TofRanges {
-    range_m: [0.0; TOF_COUNT],
-    status: [RangeStatus(5); TOF_COUNT],
-};
-
+pub const ALL_BROKEN: TofRanges =
+    TofRanges { range_m: [0.0; TOF_COUNT], status: [RangeStatus(5); TOF_COUNT] };

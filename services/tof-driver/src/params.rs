@@ -122,7 +122,9 @@ pub enum ParamsError {
         max: f64,
     },
     /// The mode needs more light.
-    #[error("timing_budget_ms = {budget_ms} is below the {needed_ms} ms that mode {mode:?} needs; lengthen it")]
+    #[error(
+        "timing_budget_ms = {budget_ms} is below the {needed_ms} ms that mode {mode:?} needs; lengthen it"
+    )]
     BudgetTooShort {
         /// The budget.
         budget_ms: u32,
@@ -132,7 +134,9 @@ pub enum ParamsError {
         mode: DistanceMode,
     },
     /// No time for a reading.
-    #[error("period_ms = {period_ms} has no room for timing_budget_ms = {budget_ms} and 4 ms; lengthen the first or shorten the second")]
+    #[error(
+        "period_ms = {period_ms} has no room for timing_budget_ms = {budget_ms} and 4 ms; lengthen the first or shorten the second"
+    )]
     PeriodTooShort {
         /// The period.
         period_ms: u32,
@@ -224,9 +228,5 @@ impl messages::Parameters for Params {
 }
 
 fn within(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), ParamsError> {
-    if (min..=max).contains(&value) {
-        Ok(())
-    } else {
-        Err(ParamsError::OutOfRange { name, value, min, max })
-    }
+    if (min..=max).contains(&value) { Ok(()) } else { Err(ParamsError::OutOfRange { name, value, min, max }) }
 }

@@ -2,9 +2,7 @@
 
 use crate::{DeviceError, NoiseProfile, Params, ParamsError, TofDevice};
 use geometry::{Cone, Hit, Pose2, Surface, World};
-use messages::{
-    RangeStatus, RangeStatusName, Stamped, Surroundings, TOF_COUNT, Time, TofRanges, WorldTruth,
-};
+use messages::{RangeStatus, RangeStatusName, Stamped, Surroundings, TOF_COUNT, Time, TofRanges, WorldTruth};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -96,7 +94,9 @@ impl SimulatedTof {
             let (thing, behind) = rest.split_at(gap.map_or(rest.len(), |before| before + 1));
             let fill = thing.iter().map(|echo| echo.strength).sum::<f64>() / rays;
             // Thin things flicker: now the sensor sees them, now what lies behind (COF-123).
-            if fill >= self.params.sure_fill_fraction || self.rng.random::<f64>() * self.params.sure_fill_fraction < fill {
+            if fill >= self.params.sure_fill_fraction
+                || self.rng.random::<f64>() * self.params.sure_fill_fraction < fill
+            {
                 return Some(thing.iter().map(|echo| echo.range_m).sum::<f64>() / thing.len() as f64);
             }
             rest = behind;

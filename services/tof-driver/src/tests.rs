@@ -201,7 +201,13 @@ fn refuses_nonsense_with_names_and_values() {
     refuse(Params { noise_above_m: f64::NAN, ..Params::default() }, "noise_above_m = NaN");
     refuse(Params { broken_sensors: vec![8], ..Params::default() }, "names 8");
     refuse(Params { world: "nowhere.toml".into(), ..Params::default() }, "nowhere.toml");
-    assert!(TofDriver::new(Params { timing_budget_ms: 20, mode: DistanceMode::Short, period_ms: 24, ..Params::default() }, 0).is_ok());
+    assert!(
+        TofDriver::new(
+            Params { timing_budget_ms: 20, mode: DistanceMode::Short, period_ms: 24, ..Params::default() },
+            0
+        )
+        .is_ok()
+    );
 }
 
 proptest! {

@@ -1,0 +1,65 @@
+//! The process around `base_driver`.
+use base_driver::{BaseDevice, BaseDriver, Device, Inputs, Params};
+use board::{Latest, Publisher};
+use messages::{AppliedWheels, Clearance, Odometry, Time, WheelSpeeds, WorldTruth};
+use std::process::ExitCode;
+
+/// What has to come to rest, whichever way the process leaves.
+struct Base {
+    driver: BaseDriver,
+    device: Box<dyn BaseDevice>,
+    applied: Publisher<AppliedWheels>,
+    has_stepped: bool,
+}
+
+impl Base {
+    fn step(&mut self, now: Time, ports: &mut Ports) {
+        self.device.see(ports.truth.as_mut().and_then(Latest::read));
+        let travel = self.device.travel(now).ok();
+        let inputs = Inputs { clearance: ports.clearance.read(), desired: ports.desired.read(), travel };
+        let outputs = self.driver.step(now, inputs);
+        // A controller that does not answer shows in its encoders with the next step.
+        let _ = self.device.drive(outputs.applied.left_mps, outputs.applied.right_mps);
+        self.applied.publish(&outputs.applied);
+        if let Some(odometry) = outputs.odometry {
+            ports.odometry.publish(&odometry);
+        }
+        self.has_stepped = true;
+    }
+}
+
+impl Drop for Base {
+    fn drop(&mut self) {
+        if self.has_stepped {
+            let _ = self.device.drive(0.0, 0.0);
+            self.applied.publish(&self.driver.leave());
+        }
+    }
+}
+
+struct Ports {
+    clearance: Latest<Clearance>,
+    desired: Latest<WheelSpeeds>,
+    truth: Option<Latest<WorldTruth>>,
+    odometry: Publisher<Odometry>,
+}
+
+fn main() -> ExitCode {
+    board::run(board::about!(), |node, params: Params| {
+        let mut ports = Ports {
+            clearance: node.latest("safety/clearance")?,
+            desired: node.latest("wheels/desired")?,
+            truth: match params.device {
+                Device::Simulated => Some(node.latest("world/truth")?),
+            },
+            odometry: node.publisher("wheels/odometry")?,
+        };
+        let applied = node.publisher("wheels/applied")?;
+        node.wake_on(&ports.clearance);
+        node.wake_on(&ports.desired);
+        node.every(params.period());
+        let device = params.open_device();
+        let mut base = Base { driver: BaseDriver::new(params)?, device, applied, has_stepped: false };
+        Ok(move |now| base.step(now, &mut ports))
+    })
+}
