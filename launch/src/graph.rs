@@ -17,12 +17,7 @@ mod tests;
 mod topics;
 mod tree;
 
+pub(crate) use check::{Checked, CheckedService, Publisher};
 pub(crate) use file::Overrides;
-pub(crate) use report::{Request, check_command, graph_command};
-#[allow(unused_imports, reason = "the launch commands that start processes take these")]
-pub(crate) use {
-    check::{Checked, CheckedService, CheckedTopic, Publisher, Reader},
-    problem::Palette,
-    report::prepare,
-    settings::{LaunchSettings, Priority, Restart, ViewSettings},
-};
+pub(crate) use report::{Request, check_command, graph_command, prepare};
+pub(crate) use settings::{Priority, ViewSettings};

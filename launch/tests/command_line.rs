@@ -1,5 +1,7 @@
 //! The launcher's commands that start no service, with scripts in place of services.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 use std::process::{Command, Output};

@@ -234,7 +234,8 @@ fn ask_for_defaults(
 fn not_found(service: &ServiceTable, missing: &NotFound) -> Box<Problem> {
     let message = format!("there is no binary `{}`", service.run);
     let mut help = Vec::new();
-    if let Some(name) = nearest(&service.run, missing.known.iter().map(String::as_str)) {
+    let others = missing.known.iter().map(String::as_str).filter(|name| *name != service.run);
+    if let Some(name) = nearest(&service.run, others).filter(|_| missing.command.is_none()) {
         help.push(format!("did you mean `{name}`?"));
     } else if let Some(command) = &missing.command {
         help.push(format!("build it: {command}"));

@@ -6,6 +6,9 @@ use super::tree::{Content, Entry, Node};
 use messages::unit_of;
 use serde_json::Value;
 
+/// How many names are listed where none resembles the one given.
+const NAMES_MAX: usize = 8;
+
 /// A service's parameters as it describes them.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Schema<'a> {
@@ -276,7 +279,11 @@ fn unknown(service: &str, entry: &Entry, known: &[&str]) -> Problem {
         }
         (_, Some(name)) => format!("did you mean `{name}`?"),
         _ if known.is_empty() => "it takes none; remove the line".to_owned(),
-        _ => format!("it has {}", quoted(known.iter().copied())),
+        _ => {
+            let more = known.len().saturating_sub(NAMES_MAX);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            format!("it has {}{more}", quoted(known.iter().copied().take(NAMES_MAX)))
+        }
     };
     Problem::error(&entry.key_place, message, help)
 }

@@ -1,5 +1,6 @@
 //! What the tables of a graph file mean to the launcher.
 
+use super::file::shown;
 use super::problem::{Problem, Problems};
 use super::source::{Place, Source};
 use super::suggest::hint;
@@ -250,7 +251,7 @@ fn read_graph_table(graph: &mut Graph, name_place: &mut Place, table: &Table, pr
             }
             "view" => {
                 if let Some(view) = take(value.table(), entry, "a table", problems) {
-                    read_view(&mut graph.view, view, problems);
+                    read_view(&mut graph.view, &graph.folder, view, problems);
                 }
             }
             "include" => {}
@@ -259,7 +260,7 @@ fn read_graph_table(graph: &mut Graph, name_place: &mut Place, table: &Table, pr
     }
 }
 
-fn read_view(view: &mut ViewSettings, table: &Table, problems: &mut Problems) {
+fn read_view(view: &mut ViewSettings, folder: &Path, table: &Table, problems: &mut Problems) {
     const KEYS: [&str; 6] = ["world", "truth", "pose", "path", "mission", "clearance"];
     for entry in &table.entries {
         let ViewSettings { truth, pose, path, mission, clearance, .. } = view;
@@ -277,6 +278,11 @@ fn read_view(view: &mut ViewSettings, table: &Table, problems: &mut Problems) {
         };
         if let Some(text) = take(entry.value.text(), entry, "a text", problems) {
             *slot = text.to_owned();
+            if entry.key == "world" && !folder.join(text).is_file() {
+                let message = format!("there is no world file {text}");
+                let help = format!("the name counts from {}", shown(folder));
+                problems.push(Problem::error(&entry.value.place, message, help));
+            }
         }
     }
 }

@@ -356,6 +356,8 @@ fn tables_of_the_launcher() {
     refused("cpu = [1]", "hang_after_ms = -5", "test.toml:21:17: error: `hang_after_ms` takes milliseconds, not negative, not -5", "write such a value");
     refused("cpu = [1]", "log = \"a=b=c\"", "test.toml:21:7: error: `log` takes off, error, warn, info, debug, trace, or directives such as \"info,planner=debug\", not \"a=b=c\"", "");
     refused("[graph]", "seed = 1\n[graph]", "test.toml:1:1: error: `seed` stands outside of any table", "below [graph]");
+    refused("[simulator]\n", "[graph.view]\nworld = \"none.toml\"\n[simulator]\n", "test.toml:10:9: error: there is no world file none.toml", "the name counts from");
+    refused("[simulator]\n", "[graph.view]\nwrold = \"none.toml\"\n[simulator]\n", "test.toml:10:1: error: [graph.view] has no key `wrold`", "did you mean `world`?");
     refused_case(&Case::new(&[("test.toml", "[graph]\nname = \"a\"\n")]), "test.toml:1:1: error: this graph has no services", "add a table");
     refused_case(&Case::new(&[("test.toml", "")]), "test.toml:1:1: error: this graph has no services", "add a table");
 }
