@@ -8,6 +8,7 @@ use board::host::Host;
 use board::manifest::{Manifest, Topic};
 use board::switchboard::Switchboard;
 use board::{About, Envelope, Latest, Publisher, clock};
+use iceoryx2::config::Config;
 use iceoryx2::prelude::*;
 use messages::{Message, Parameters, Time};
 use rustix::thread::{CpuSet, futex, sched_setaffinity};
@@ -398,7 +399,7 @@ fn pinned() -> Result<(Params, bool), Failure> {
 fn bare(is_ping: bool) -> Result<(), Failure> {
     let (params, _) = pinned()?;
     set_log_level(LogLevel::Fatal);
-    let mut config = iceoryx2::config::Config::default();
+    let mut config = Config::default();
     config.global.prefix = bare_prefix(&params.folder).as_str().try_into().map_err(|_| "prefix")?;
     config.global.set_root_path(&params.folder.to_string_lossy().as_ref().try_into().map_err(|_| "root")?);
     let node = NodeBuilder::new()
