@@ -312,7 +312,7 @@ fn board_ping(node: &mut board::Node, params: Params) -> Result<Step, Failure> {
                 let mut spins = 0_u32;
                 while newest(&mut pong) != Some(number) {
                     spins = spins.wrapping_add(1);
-                    if spins % 65_536 == 0 && clock::monotonic().since(trips.asked) > AGAIN {
+                    if spins.is_multiple_of(65_536) && clock::monotonic().since(trips.asked) > AGAIN {
                         send(&mut ping, number, bytes);
                     }
                 }
@@ -489,7 +489,7 @@ fn bare(is_ping: bool) -> Result<(), Failure> {
         while newest()? != Some(number) {
             wait(AGAIN)?;
             spins = spins.wrapping_add(1);
-            if (!params.polling || spins % 65_536 == 0) && clock::monotonic().since(trips.asked) > AGAIN {
+            if (!params.polling || spins.is_multiple_of(65_536)) && clock::monotonic().since(trips.asked) > AGAIN {
                 send(number)?;
             }
         }
