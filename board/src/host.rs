@@ -3,6 +3,7 @@
 //! Topics are made here, before any service lives, because a process that is killed while it makes one can leave it unusable
 //! for ever. Services only open them.
 
+use crate::janitor;
 use crate::manifest::Manifest;
 use crate::place::{self, InvalidBoardName, Place, Turn};
 use crate::switchboard::{self, SlotState, Switchboard};
@@ -10,8 +11,8 @@ use crate::transport::{Member, RawTopic, TopicShape, TransportError};
 use rustix::fs::{FlockOperation, flock};
 use std::fs::{File, OpenOptions};
 use std::io;
-use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
-use std::path::Path;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -325,10 +326,8 @@ fn count_files(folder: &Path) -> usize {
 /// When the board cannot be joined.
 pub fn clean_dead(name: &str) -> Result<usize, HostError> {
     let place = Place::new(name)?;
-    // Whoever died while making a file leaves it half made, and the transport waits for its end.
-    remove_half_made(&place, Duration::from_secs(1));
-    let member = Member::join(&place)?;
-    let failed = member.clean();
+    // Those who died while they made a file leave it half made, and the transport, here and in the services, waits for its end.
+    let failed = janitor::beside(&place, || Member::join(&place).map(|member| member.clean()))?;
     if let Ok(switchboard) = Switchboard::open(&place.file(SWITCHBOARD)) {
         let dead: Vec<u32> = switchboard.dead_tools().map(|(index, _)| index).collect();
         dead.into_iter().for_each(|index| switchboard.release_dead(index));
@@ -336,28 +335,9 @@ pub fn clean_dead(name: &str) -> Result<usize, HostError> {
     Ok(failed)
 }
 
-/// Removes files that a dead process has begun and not finished: write-protected when whole, they are still writable.
-fn remove_half_made(place: &Place, age: Duration) {
-    let old = |path: &Path| {
-        let modified = std::fs::symlink_metadata(path).and_then(|found| found.modified());
-        modified.is_ok_and(|time| time.elapsed().is_ok_and(|passed| passed >= age))
-    };
-    let mode = |path: &Path| std::fs::symlink_metadata(path).map_or(0, |found| found.mode() & 0o777);
-    for file in place.shared_memory() {
-        if mode(&file) == 0o200 && old(&file) {
-            let _ = std::fs::remove_file(file);
-        }
-    }
-    let nodes = place.file("nodes");
-    for folder in
-        std::fs::read_dir(&nodes).into_iter().flatten().flatten().filter(|entry| entry.path().is_dir())
-    {
-        let id = folder.file_name().to_string_lossy().into_owned();
-        let monitor = nodes.join(format!("{}{id}.node_monitor", place.prefix()));
-        if !monitor.exists() && old(&folder.path()) {
-            let _ = std::fs::remove_dir_all(folder.path());
-        }
-    }
+/// Shared memory of a board that was begun by a process which is dead; [`clean_dead`] removes it.
+pub fn half_made(place: &Place) -> Vec<PathBuf> {
+    janitor::half_made(place)
 }
 
 /// Every service of the page, for those who look.

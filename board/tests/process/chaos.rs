@@ -114,6 +114,11 @@ fn clean(robot: &Robot, tally: &mut Tally) {
         }
         if clock::monotonic() > deadline {
             tally.hung += 1;
+            if let Some(script) = std::env::var_os("CORKBOARD_TEST_ON_HANG") {
+                let _ = std::process::Command::new(script)
+                    .args([&cleaner.id().to_string(), robot.name()])
+                    .status();
+            }
             cleaner.kill().unwrap();
             cleaner.wait().unwrap();
             return;

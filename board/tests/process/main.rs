@@ -13,6 +13,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     match std::env::var(services::WHICH).as_deref() {
         Ok("host") => teardown::host_process(),
+        Ok("robbed") => teardown::robbed_process(),
         Ok("tool") => teardown::tool_process(),
         Ok("cleaner") => chaos::cleaner_process(),
         Ok("bell") => bells::other_process(),
@@ -37,6 +38,7 @@ fn main() -> ExitCode {
                 "a_tools_place_is_taken_over_after_its_death",
                 teardown::a_tools_place_is_taken_over_after_its_death,
             ),
+            ("a_folder_of_somebody_else_is_left_alone", teardown::a_folder_of_somebody_else_is_left_alone),
             ("deaths_during_start_up_break_nothing", chaos::deaths_during_start_up_break_nothing),
         ]),
     }

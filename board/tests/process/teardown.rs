@@ -90,3 +90,45 @@ pub(crate) fn a_tools_place_is_taken_over_after_its_death() {
     }
     robot.take_down();
 }
+
+/// Tries to make and to sweep boards, as a user whose folder is somebody else's.
+pub(crate) fn robbed_process() -> ExitCode {
+    let created = Host::create("robbed", manifest(&[]), false).map(|_| ());
+    let swept = host::sweep();
+    println!("{}", created.err().map_or("a board was made".to_owned(), |error| error.to_string()));
+    println!("{}", swept.map_or_else(|error| error.to_string(), |swept| format!("swept {swept:?}")));
+    ExitCode::SUCCESS
+}
+
+pub(crate) fn a_folder_of_somebody_else_is_left_alone() {
+    // A user whom no machine has.
+    const USER: u32 = 3_054_321;
+    if !rustix::process::getuid().is_root() {
+        println!("skipped: only root can be two users");
+        return;
+    }
+    let folder = std::path::PathBuf::from(format!("/dev/shm/corkboard-{USER}"));
+    let elsewhere = tempfile::tempdir().unwrap();
+    let check = |victim: &std::path::Path| {
+        std::fs::create_dir_all(victim.join("robbed")).unwrap();
+        std::fs::write(victim.join("robbed/file"), "precious").unwrap();
+        std::os::unix::fs::chown(victim.join("robbed"), Some(USER), None).unwrap();
+        let mut command = itself("robbed");
+        std::os::unix::process::CommandExt::uid(&mut command, USER);
+        let Ok(output) = command.output() else {
+            println!("skipped: the test binary is not another user's to run");
+            return;
+        };
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(said.matches("is not a folder of this user").count(), 2, "{said}");
+        assert!(victim.join("robbed/file").exists(), "somebody else's file was removed");
+    };
+    check(&folder);
+    std::fs::remove_dir_all(&folder).unwrap();
+    // A link is worse: it may lead anywhere, and may even belong to the right user.
+    std::os::unix::fs::symlink(elsewhere.path(), &folder).unwrap();
+    std::os::unix::fs::lchown(&folder, Some(USER), None).unwrap();
+    std::os::unix::fs::chown(elsewhere.path(), Some(USER), None).unwrap();
+    check(elsewhere.path());
+    std::fs::remove_file(&folder).unwrap();
+}
