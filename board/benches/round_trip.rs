@@ -489,7 +489,9 @@ fn bare(is_ping: bool) -> Result<(), Failure> {
         while newest()? != Some(number) {
             wait(AGAIN)?;
             spins = spins.wrapping_add(1);
-            if (!params.polling || spins.is_multiple_of(65_536)) && clock::monotonic().since(trips.asked) > AGAIN {
+            if (!params.polling || spins.is_multiple_of(65_536))
+                && clock::monotonic().since(trips.asked) > AGAIN
+            {
                 send(number)?;
             }
         }

@@ -142,7 +142,7 @@ fn random_message(random: &mut Pcg64, description: &Description) -> Vec<u8> {
         Some(element) => {
             let elements = random.next_u64() % (RANDOM_ELEMENTS + 1);
             let whole = elements_offset(description.size) + elements as usize * element.size();
-            if random.next_u64() % 4 == 0 { random.next_u64() as usize % (whole + 1) } else { whole }
+            if random.next_u64().is_multiple_of(4) { random.next_u64() as usize % (whole + 1) } else { whole }
         }
     };
     let mut bytes = vec![0; length];
