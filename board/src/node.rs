@@ -149,7 +149,7 @@ impl Joined {
     ) -> Result<PublisherLink, JoinError> {
         let (index, _) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
         let publisher = Rc::new(self.member.open(topic, fingerprint)?.publisher(bytes)?);
-        let link = PublisherLink { shared: Rc::clone(&self.shared), topic: index, publisher };
+        let link = PublisherLink { shared: Rc::clone(&self.shared), topic: index, publisher, measures: false };
         self.publishers.push(link.clone());
         Ok(link)
     }
@@ -267,6 +267,19 @@ impl Node {
     /// # Errors
     /// When the topic is not on the board, carries messages of another layout, or belongs to another service.
     pub fn publisher<T: Message>(&mut self, topic: &str) -> Result<Publisher<T>, JoinError> {
+        self.publisher_of(topic, false)
+    }
+
+    /// As `publisher`, for readings of the world: their age begins with their publication, whatever else was read in the same step. Without it the age of
+    /// a command would run around the loop from the wheels through odometry and pose back to the wheels for ever.
+    ///
+    /// # Errors
+    /// As `publisher`.
+    pub fn sensor_publisher<T: Message>(&mut self, topic: &str) -> Result<Publisher<T>, JoinError> {
+        self.publisher_of(topic, true)
+    }
+
+    fn publisher_of<T: Message>(&mut self, topic: &str, measures: bool) -> Result<Publisher<T>, JoinError> {
         self.describe::<T>(topic, Direction::Publish, true, 0);
         let role = self.role.clone();
         let Some(joined) = &mut self.joined else { return Ok(Publisher::new(topic, None)) };
@@ -278,7 +291,8 @@ impl Node {
         // Room for a few dozen elements from the start; the memory grows by itself.
         let bytes =
             if T::HAS_ELEMENTS { size_of::<T>() + 64 * size_of::<T::Element>() } else { size_of::<T>() };
-        let link = joined.open_publisher(topic, fingerprint, bytes)?;
+        let mut link = joined.open_publisher(topic, fingerprint, bytes)?;
+        link.measures = measures;
         if let Some(entry) = joined.shared.switchboard.topic(link.topic)
             && link.is_heard()
         {

@@ -166,6 +166,8 @@ pub(crate) struct PublisherLink {
     pub(crate) shared: Rc<Shared>,
     pub(crate) topic: u32,
     pub(crate) publisher: Rc<RawPublisher>,
+    /// Whether its messages are readings of the world: they are as old as themselves, whatever else was read in the step.
+    pub(crate) measures: bool,
 }
 
 impl PublisherLink {
@@ -181,7 +183,8 @@ impl PublisherLink {
 
     pub(crate) fn send(&self, loan: RawLoan) -> Result<(), TransportError> {
         let now = self.shared.clock();
-        self.send_stamped(loan, now, self.shared.origin(now))
+        let origin = if self.measures { now } else { self.shared.origin(now) };
+        self.send_stamped(loan, now, origin)
     }
 
     pub(crate) fn send_stamped(

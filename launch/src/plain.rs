@@ -19,6 +19,11 @@ impl Lines {
     }
 }
 
+/// A remark without its numbers: what only counts on is no news.
+fn wording(remark: &str) -> String {
+    remark.chars().filter(|letter| !letter.is_ascii_digit()).collect()
+}
+
 impl Display for Lines {
     fn show(&mut self, supervisor: &Supervisor, monitor: &mut Monitor) {
         let new = supervisor.event_count - self.printed;
@@ -31,11 +36,11 @@ impl Display for Lines {
             }
         }
         if let Some(summary) = monitor.summary().filter(|_| !self.only_trouble)
-            && summary.remark.as_str() != self.last_remark
+            && wording(summary.remark.as_str()) != self.last_remark
         {
-            self.last_remark = summary.remark.as_str().to_owned();
+            self.last_remark = wording(summary.remark.as_str());
             let at_s = board::clock::monotonic().seconds_since(supervisor.began);
-            println!("[{at_s:>9.3}] referee: {}", self.last_remark);
+            println!("[{at_s:>9.3}] referee: {}", summary.remark);
         }
     }
 

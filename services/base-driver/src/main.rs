@@ -50,9 +50,9 @@ fn main() -> ExitCode {
             clearance: node.latest("safety/clearance")?,
             desired: node.latest("wheels/desired")?,
             truth: match params.device {
-                Device::Simulated => Some(node.latest("world/truth")?),
+                Device::Simulated => Some(node.reference("world/truth")?),
             },
-            odometry: node.publisher("wheels/odometry")?,
+            odometry: node.sensor_publisher("wheels/odometry")?,
         };
         let applied = node.publisher("wheels/applied")?;
         node.wake_on(&ports.clearance);

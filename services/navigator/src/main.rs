@@ -14,7 +14,7 @@ fn main() -> ExitCode {
         let mut sighting = node.reference::<DoorSighting>("door/sighting")?;
         let mut clearance = node.latest::<Clearance>("safety/clearance")?;
         let mut elevator = node.optional_reference::<ElevatorState>("elevator/state")?;
-        let mut wheels = node.optional::<AppliedWheels>("wheels/applied")?;
+        let mut wheels = node.optional_reference::<AppliedWheels>("wheels/applied")?;
         let mut status = node.publisher::<MissionStatus>("mission/status")?;
         let mut request = node.publisher::<PlanRequest>("plan/request")?;
         let mut command = node.publisher::<DriveCommand>("drive/command")?;

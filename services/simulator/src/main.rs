@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     board::run(board::about!(), |node, params: Params| {
-        let mut applied = node.optional::<AppliedWheels>("wheels/applied")?;
+        let mut applied = node.optional_reference::<AppliedWheels>("wheels/applied")?;
         let mut call = node.optional_reference::<ElevatorCall>("elevator/call")?;
         let mut truth = node.publisher::<WorldTruth>("world/truth")?;
         let mut elevator = node.publisher::<ElevatorState>("elevator/state")?;

@@ -6,7 +6,7 @@ use tag_driver::{Device, Inputs, Params, TagDriver};
 fn main() -> ExitCode {
     board::run(board::about!(), |node, params: Params| {
         let mut truth = match params.device {
-            Device::Simulated => Some(node.latest::<WorldTruth>("world/truth")?),
+            Device::Simulated => Some(node.reference::<WorldTruth>("world/truth")?),
         };
         let mut ranges = node.publisher::<TagRanges>("tag/ranges")?;
         node.every(params.period());

@@ -10,7 +10,7 @@ fn main() -> ExitCode {
         let mut odometry = node.latest::<Odometry>("wheels/odometry")?;
         let mut tags = node.queue::<TagRanges>("tag/ranges")?;
         let mut ranges = node.optional::<TofRanges>("tof/ranges")?;
-        let mut heading = node.optional::<HeadingCorrection>("heading/correction")?;
+        let mut heading = node.optional_reference::<HeadingCorrection>("heading/correction")?;
         let mut pose = node.publisher::<PoseEstimate>("location/pose")?;
         node.wake_on(&odometry);
         node.wake_on(&tags);
