@@ -16,6 +16,9 @@ pub enum SetupError {
     /// The parameters.
     #[error(transparent)]
     Params(#[from] ParamsError),
+    /// The world file.
+    #[error("world: {0}")]
+    World(#[from] geometry::WorldError),
     /// A rule file that cannot be read from the disk.
     #[error("{file}: {source}")]
     Unreadable {

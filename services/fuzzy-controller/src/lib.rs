@@ -20,7 +20,7 @@ pub use params::{Params, ParamsError, RangeSource};
 use clearance::TofMemory;
 use controllers::Wheels;
 use course::Course;
-use geometry::{Pose2, angle};
+use geometry::{Pose2, Segment, World, angle};
 use messages::{
     DriveCommand, DriveModeName, Odometry, Parameters, Path, PlanStateName, PoseEstimate, RangeScan, Stamped,
     Time, TofRanges, WheelSpeeds,
@@ -134,6 +134,8 @@ pub struct FuzzyController {
     course: Course,
     tof: TofMemory,
     surround: Surround,
+    /// The walls of each floor.
+    walls: Vec<(i32, Vec<Segment>)>,
     rotating: bool,
     last_error_rad: f64,
     wheels: Wheels,
@@ -148,7 +150,10 @@ impl FuzzyController {
     /// Names the parameter, or the rule file with line and column.
     pub fn new(params: Params) -> Result<Self, SetupError> {
         params.check()?;
+        let world = if params.world.is_empty() { World::default() } else { World::load(&params.world)? };
+        let floors = world.floors.iter().map(|floor| (floor.number, world.wall_segments(floor.number)));
         Ok(Self {
+            walls: floors.collect(),
             controllers: Controllers::new(&params)?,
             params,
             course: Course::default(),
@@ -185,6 +190,9 @@ impl FuzzyController {
         let here = inputs.odometry.and_then(|way| way.fresh(now, max_age)).and_then(|way| way.pose().ok());
         let ranges = inputs.ranges.map(|ranges| (ranges.stamp, ranges.message));
         self.surround.observe(now, here, ranges, &self.params);
+        let floor = inputs.pose.map(|pose| pose.floor);
+        let walls = self.walls.iter().find(|(number, _)| Some(*number) == floor);
+        self.surround.show_walls(pose, walls.map_or(&[], |(_, walls)| walls.as_slice()));
 
         let slow_enough = limited(wanted.wheels, wanted.speed_limit_mps.min(self.params.top_speed_mps));
         let slow_enough = self.surround.allowed(slow_enough, &self.params);

@@ -24,6 +24,8 @@ pub enum RangeSource {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
+    /// World file whose walls the hull keeps away from, as from what was seen; empty for none.
+    pub world: String,
     /// Distance between the wheels, in metres.
     #[schemars(range(min = 0.05, max = 5.0))]
     pub track_m: f64,
@@ -130,6 +132,7 @@ pub struct Params {
 impl Default for Params {
     fn default() -> Self {
         Self {
+            world: String::new(),
             track_m: 0.536,
             top_speed_mps: 0.47,
             rules_top_speed_mps: 0.47,

@@ -6,7 +6,7 @@
 
 use crate::controllers::Wheels;
 use crate::params::Params;
-use geometry::{Point2, Pose2};
+use geometry::{Point2, Pose2, Segment};
 use messages::{Reading, TOF_COUNT, Time, TofRanges};
 
 /// Readings up to here are remembered.
@@ -26,6 +26,9 @@ const KEPT_S: f64 = 20.0;
 const KEPT_WITHIN_M: f64 = 1.5;
 /// So many points are remembered at most.
 const POINTS_MAX: usize = 800;
+/// Known walls are looked at in points so far apart, and within this distance.
+const WALL_POINT_M: f64 = 0.04;
+const WALLS_WITHIN_M: f64 = 0.8;
 /// A motion is tried for so long, in so many steps.
 const TRIED_S: f64 = 0.9;
 const TRIES: u32 = 6;
@@ -47,6 +50,8 @@ pub(crate) struct Surround {
     points: Vec<Point>,
     here: Option<Pose2>,
     frame: Option<Time>,
+    /// The known walls nearby, as points too.
+    walls: Vec<Point2<f64>>,
 }
 
 impl Surround {
@@ -92,6 +97,18 @@ impl Surround {
             for share in [-SURE_SHARE, 0.0, SURE_SHARE] {
                 self.add(now, eye.transform(Point2::new(range_m, share * HALF_CONE * range_m)));
             }
+        }
+    }
+
+    /// Takes in the walls that the world has around the robot, which stands at `pose` in the map.
+    pub(crate) fn show_walls(&mut self, pose: Option<Pose2>, walls: &[Segment]) {
+        self.walls.clear();
+        let (Some(pose), Some(here)) = (pose, self.here) else { return };
+        for wall in walls.iter().filter(|wall| wall.distance_m(pose.position()) < WALLS_WITHIN_M) {
+            let pieces = (wall.length_m() / WALL_POINT_M).ceil().max(1.0) as u32;
+            let places = (0..=pieces).map(|piece| wall.a + wall.vector() * (f64::from(piece) / f64::from(pieces)));
+            let near = places.filter(|place| (place - pose.position()).norm() < WALLS_WITHIN_M);
+            self.walls.extend(near.map(|place| here.transform(pose.inverse_transform(place))));
         }
     }
 
@@ -147,13 +164,15 @@ impl Surround {
     fn is_clear(&self, here: Pose2, [left, right]: Wheels, margin_m: f64, params: &Params) -> bool {
         let step_s = TRIED_S / f64::from(TRIES);
         let (step_m, turn_rad) = (0.5 * (left + right) * step_s, (right - left) / params.track_m * step_s);
-        self.points.iter().all(|point| {
-            let now_m = distance_m(here, point.place, params);
-            let least_m = margin_m.min(now_m - NOISE_M);
+        let places = self.points.iter().map(|point| point.place).chain(self.walls.iter().copied());
+        places.into_iter().all(|place| {
+            let now_m = distance_m(here, place, params);
+            let noise_m = if now_m > 0.5 * params.keep_away_m { NOISE_M } else { 0.0 };
+            let least_m = margin_m.min(now_m - noise_m);
             let mut pose = here;
             (0..TRIES).all(|_| {
                 pose = pose.after_arc(step_m, turn_rad);
-                distance_m(pose, point.place, params) >= least_m
+                distance_m(pose, place, params) >= least_m
             })
         })
     }

@@ -7,6 +7,10 @@ use crate::line;
 /// Sixteenths: an extra cost of 16 doubles the cost of a step.
 const SIXTEENTHS: f32 = 16.0;
 
+/// Around an observed obstacle this much more room costs: not as much as beside walls, as what stands on the other side may not be
+/// seen yet.
+const OBSTACLE_BAND_M: f64 = 0.10;
+
 /// What decides where the robot may be and what it costs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Costs {
@@ -62,7 +66,7 @@ impl Field {
         let has_costs = costs.keep_right_weight > 0.0 || costs.clearance_weight > 0.0;
         let walls_extra = if has_costs { extras(&grid, &wall_m, costs) } else { Vec::new() };
         let taken_m = costs.robot_radius_m + costs.obstacle_margin_m;
-        let near_m = taken_m.max(costs.clearance_m) + grid.resolution_m();
+        let near_m = taken_m + OBSTACLE_BAND_M;
         let taken_disc = disc(0.0, taken_m, grid.resolution_m());
         let middle_m = 0.5 * (taken_m + near_m);
         let near_discs = [middle_m, near_m].map(|to_m| disc(taken_m, to_m, grid.resolution_m()));

@@ -13,6 +13,8 @@ const DELIVERED_S: f64 = 1.0;
 const FACING_RAD: f64 = 0.15;
 /// A robot that stands so near to its goal for this long has arrived.
 const CLOSE_ENOUGH: (f64, f64) = (2.0, 2.0);
+/// The place before the elevator is reached within this share of the tolerance of other places.
+const BEFORE_ELEVATOR: f64 = 0.4;
 /// Farther from the approach than this, the search for the door begins anew.
 const ASTRAY_M: f64 = 0.8;
 
@@ -318,7 +320,9 @@ impl Navigator {
         // The end of a path that had to stop short of its goal is as good.
         let away_m =
             if to_goal_m <= 2.0 * self.params.goal_tolerance_m { to_goal_m.min(to_end_m) } else { to_goal_m };
-        let tolerance_m = self.params.arrival_tolerance_m;
+        // From beside the elevator's door the robot would enter it askew.
+        let share = if self.kept.ride == Ride::Approaching { BEFORE_ELEVATOR } else { 1.0 };
+        let tolerance_m = share * self.params.arrival_tolerance_m;
         let (times, seconds) = CLOSE_ENOUGH;
         let stands = self.watch.stands_s(senses.now) >= seconds && self.request.is_some();
         if senses.floor == goal.floor && (away_m <= tolerance_m || (stands && away_m <= times * tolerance_m))
