@@ -6,7 +6,7 @@
 
 use crate::controllers::Wheels;
 use crate::params::Params;
-use geometry::{Point2, Pose2, Segment};
+use geometry::{Point2, Pose2, Segment, Vector2};
 use messages::{Reading, TOF_COUNT, Time, TofRanges};
 
 /// Readings up to here are remembered.
@@ -29,6 +29,13 @@ const POINTS_MAX: usize = 800;
 /// Known walls are looked at in points so far apart, and within this distance.
 const WALL_POINT_M: f64 = 0.04;
 const WALLS_WITHIN_M: f64 = 0.8;
+/// Furniture stands along walls and may be so long, although only its ends are seen: a mail cart's shelf lies below the sensors
+/// (COF-122). What is seen this near, and not at a known wall, is taken for such.
+const FURNITURE_M: f64 = 0.90;
+const FURNITURE_WITHIN_M: f64 = 0.6;
+const FURNITURE_POINTS: u32 = 9;
+const OFF_WALL_M: f64 = 0.12;
+const LONG_WALL_M: f64 = 1.0;
 /// A motion is tried for so long, in so many steps.
 const TRIED_S: f64 = 0.9;
 const TRIES: u32 = 6;
@@ -52,6 +59,10 @@ pub(crate) struct Surround {
     frame: Option<Time>,
     /// The known walls nearby, as points too.
     walls: Vec<Point2<f64>>,
+    /// The direction of the nearest long wall.
+    axis: Option<Vector2<f64>>,
+    /// How far what was seen may reach beyond its seen end.
+    assumed: Vec<Point>,
 }
 
 impl Surround {
@@ -66,13 +77,16 @@ impl Surround {
         self.here = here;
         let Some(here) = here else {
             self.points.clear();
+            self.assumed.clear();
             return;
         };
-        self.points.retain(|point| {
+        let is_kept = |point: &Point| {
             let near = (point.place - here.position()).norm() <= KEPT_WITHIN_M;
             let below = distance_m(here, point.place, params) <= 0.0;
             near && !below && now.seconds_since(point.seen) <= KEPT_S
-        });
+        };
+        self.points.retain(is_kept);
+        self.assumed.retain(is_kept);
         let Some((stamp, ranges)) = ranges.filter(|(stamp, _)| self.frame != Some(*stamp)) else { return };
         self.frame = Some(stamp);
         let looks = (0..TOF_COUNT).filter_map(|sensor| {
@@ -85,40 +99,57 @@ impl Surround {
         });
         for (eye, range_m) in looks.clone() {
             let passed_m = range_m.min(SEEN_WITHIN_M) - PASSED_M;
-            self.points.retain_mut(|point| {
+            let remains = |point: &mut Point| {
                 let seen = eye.inverse_transform(point.place);
                 if seen.x > 0.0 && seen.x < passed_m && seen.y.abs() <= SURE_SHARE * HALF_CONE * seen.x {
                     point.weight = point.weight.saturating_sub(1);
                 }
                 point.weight > 0
-            });
+            };
+            self.points.retain_mut(remains);
+            // The side sensors look over a shelf; those in front saw it from farther away.
+            if (eye.heading_rad - here.heading_rad).abs() < 0.1 {
+                self.assumed.retain_mut(remains);
+            }
         }
         for (eye, range_m) in looks.filter(|(_, range_m)| *range_m < SEEN_WITHIN_M) {
             for share in [-SURE_SHARE, 0.0, SURE_SHARE] {
-                self.add(now, eye.transform(Point2::new(range_m, share * HALF_CONE * range_m)));
+                add(&mut self.points, now, eye.transform(Point2::new(range_m, share * HALF_CONE * range_m)));
             }
+            self.assume(now, here, eye.transform(Point2::new(range_m, 0.0)), range_m);
         }
     }
 
     /// Takes in the walls that the world has around the robot, which stands at `pose` in the map.
     pub(crate) fn show_walls(&mut self, pose: Option<Pose2>, walls: &[Segment]) {
         self.walls.clear();
+        self.axis = None;
         let (Some(pose), Some(here)) = (pose, self.here) else { return };
         for wall in walls.iter().filter(|wall| wall.distance_m(pose.position()) < WALLS_WITHIN_M) {
             let pieces = (wall.length_m() / WALL_POINT_M).ceil().max(1.0) as u32;
-            let places = (0..=pieces).map(|piece| wall.a + wall.vector() * (f64::from(piece) / f64::from(pieces)));
+            let places =
+                (0..=pieces).map(|piece| wall.a + wall.vector() * (f64::from(piece) / f64::from(pieces)));
             let near = places.filter(|place| (place - pose.position()).norm() < WALLS_WITHIN_M);
             self.walls.extend(near.map(|place| here.transform(pose.inverse_transform(place))));
         }
+        let distance_m = |wall: &&Segment| wall.distance_m(pose.position());
+        let long = walls.iter().filter(|wall| wall.length_m() >= LONG_WALL_M);
+        let nearest = long.min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
+        let turn_rad = here.heading_rad - pose.heading_rad;
+        self.axis =
+            nearest.and_then(Segment::direction).map(|along| nalgebra::Rotation2::new(turn_rad) * along);
     }
 
-    fn add(&mut self, now: Time, place: Point2<f64>) {
-        let known = self.points.iter_mut().find(|point| (point.place - place).norm() < ONE_POINT_M);
-        if let Some(point) = known {
-            point.seen = now;
-            point.weight = (point.weight + SIGHTING).min(WEIGHT_MAX);
-        } else if self.points.len() < POINTS_MAX {
-            self.points.push(Point { place, seen: now, weight: SIGHTING });
+    /// What was seen may go on along the wall, in the direction in which the robot drives.
+    fn assume(&mut self, now: Time, here: Pose2, place: Point2<f64>, range_m: f64) {
+        let off_wall = self.walls.iter().all(|wall| (wall - place).norm() > OFF_WALL_M);
+        let Some(axis) = self.axis.filter(|_| off_wall && range_m < FURNITURE_WITHIN_M) else { return };
+        let along = axis.dot(&Vector2::new(here.heading_rad.cos(), here.heading_rad.sin()));
+        if along.abs() > 0.5 {
+            for step in 1..=FURNITURE_POINTS {
+                let way_m = FURNITURE_M * f64::from(step) / f64::from(FURNITURE_POINTS);
+                add(&mut self.assumed, now, place + axis * (way_m * along.signum()));
+            }
         }
     }
 
@@ -164,7 +195,8 @@ impl Surround {
     fn is_clear(&self, here: Pose2, [left, right]: Wheels, margin_m: f64, params: &Params) -> bool {
         let step_s = TRIED_S / f64::from(TRIES);
         let (step_m, turn_rad) = (0.5 * (left + right) * step_s, (right - left) / params.track_m * step_s);
-        let places = self.points.iter().map(|point| point.place).chain(self.walls.iter().copied());
+        let points = self.points.iter().chain(&self.assumed);
+        let places = points.map(|point| point.place).chain(self.walls.iter().copied());
         places.into_iter().all(|place| {
             let now_m = distance_m(here, place, params);
             let noise_m = if now_m > 0.5 * params.keep_away_m { NOISE_M } else { 0.0 };
@@ -175,6 +207,16 @@ impl Surround {
                 distance_m(pose, place, params) >= least_m
             })
         })
+    }
+}
+
+fn add(points: &mut Vec<Point>, now: Time, place: Point2<f64>) {
+    let known = points.iter_mut().find(|point| (point.place - place).norm() < ONE_POINT_M);
+    if let Some(point) = known {
+        point.seen = now;
+        point.weight = (point.weight + SIGHTING).min(WEIGHT_MAX);
+    } else if points.len() < POINTS_MAX {
+        points.push(Point { place, seen: now, weight: SIGHTING });
     }
 }
 

@@ -109,7 +109,7 @@ impl Default for Params {
             halt_tolerance_m: 0.05,
             halt_accept_m: 0.1,
             overrun_m: 0.7,
-            sighting_gate_m: 0.4,
+            sighting_gate_m: 0.25,
             min_confidence: 0.3,
             travel_speed_mps: 0.36,
             creep_speed_mps: 0.15,
