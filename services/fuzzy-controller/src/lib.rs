@@ -25,7 +25,7 @@ use messages::{
     DriveCommand, DriveModeName, Odometry, Parameters, Path, PlanStateName, PoseEstimate, RangeScan, Stamped,
     Time, TofRanges, WheelSpeeds,
 };
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::time::Duration;
 use surround::Surround;
 
@@ -195,7 +195,9 @@ impl FuzzyController {
         self.surround.show_walls(pose, walls.map_or(&[], |(_, walls)| walls.as_slice()));
 
         let slow_enough = limited(wanted.wheels, wanted.speed_limit_mps.min(self.params.top_speed_mps));
-        let slow_enough = self.surround.allowed(slow_enough, &self.params);
+        // Only on a path, and not when it leads back.
+        let may_advance = wanted.distance_m.is_finite() && wanted.error_rad.abs() < FRAC_PI_2;
+        let slow_enough = self.surround.allowed(slow_enough, may_advance, &self.params);
         let change_mps =
             if wanted.at_once { f64::INFINITY } else { self.params.acceleration_mps2 * elapsed_s };
         self.wheels = eased(self.wheels, slow_enough, change_mps);

@@ -14,6 +14,8 @@ const SEEN_WITHIN_M: f64 = 0.8;
 /// Half of a sensor's field of view (COF-021), and the share of it in which a reading that passes is trusted to see everything.
 const HALF_CONE: f64 = 0.13;
 const SURE_SHARE: f64 = 0.6;
+/// The points at a reading's ends, which lie on the edge of that share, are within it.
+const SLACK_M: f64 = 0.01;
 /// A point this much nearer than a reading would have been seen.
 const PASSED_M: f64 = 0.08;
 /// Points nearer to each other than this are one.
@@ -28,12 +30,13 @@ const KEPT_WITHIN_M: f64 = 1.5;
 const POINTS_MAX: usize = 800;
 /// Known walls are looked at in points so far apart, and within this distance.
 const WALL_POINT_M: f64 = 0.04;
-const WALLS_WITHIN_M: f64 = 0.8;
+const WALLS_WITHIN_M: f64 = 1.1;
 /// Furniture stands along walls and may be so long, although only its ends are seen: a mail cart's shelf lies below the sensors
 /// (COF-122). What is seen this near, and not at a known wall, is taken for such.
 const FURNITURE_M: f64 = 0.90;
-const FURNITURE_WITHIN_M: f64 = 0.6;
+const FURNITURE_WITHIN_M: f64 = 0.45;
 const FURNITURE_POINTS: u32 = 9;
+const NONE_HERE_M: f64 = 0.03;
 const OFF_WALL_M: f64 = 0.12;
 const LONG_WALL_M: f64 = 1.0;
 /// A motion is tried for so long, in so many steps.
@@ -86,7 +89,7 @@ impl Surround {
             near && !below && now.seconds_since(point.seen) <= KEPT_S
         };
         self.points.retain(is_kept);
-        self.assumed.retain(is_kept);
+        self.assumed.retain(|point| is_kept(point) && distance_m(here, point.place, params) > NONE_HERE_M);
         let Some((stamp, ranges)) = ranges.filter(|(stamp, _)| self.frame != Some(*stamp)) else { return };
         self.frame = Some(stamp);
         let looks = (0..TOF_COUNT).filter_map(|sensor| {
@@ -101,7 +104,10 @@ impl Surround {
             let passed_m = range_m.min(SEEN_WITHIN_M) - PASSED_M;
             let remains = |point: &mut Point| {
                 let seen = eye.inverse_transform(point.place);
-                if seen.x > 0.0 && seen.x < passed_m && seen.y.abs() <= SURE_SHARE * HALF_CONE * seen.x {
+                if seen.x > 0.0
+                    && seen.x < passed_m
+                    && seen.y.abs() <= SURE_SHARE * HALF_CONE * seen.x + SLACK_M
+                {
                     point.weight = point.weight.saturating_sub(1);
                 }
                 point.weight > 0
@@ -154,7 +160,8 @@ impl Surround {
     }
 
     /// The motion nearest to the wanted one that keeps away from everything seen; standing when there is none.
-    pub(crate) fn allowed(&self, wanted: Wheels, params: &Params) -> Wheels {
+    /// `may_advance` lets a turn on the spot that cannot be turned here be put off: the robot then drives on straight.
+    pub(crate) fn allowed(&self, wanted: Wheels, may_advance: bool, params: &Params) -> Wheels {
         let (Some(here), true) = (self.here, params.keep_away_m > 0.0) else { return wanted };
         let forward_mps = 0.5 * (wanted[0] + wanted[1]);
         let fastest_mps = wanted[0].abs().max(wanted[1].abs());
@@ -165,30 +172,13 @@ impl Surround {
         if self.is_clear(here, slow, params.keep_away_m, params) {
             return slow;
         }
-        // Of what is left the motion that gets on best, and then the one that turns most alike.
-        let ([left, right], direction) = (slow, forward_mps.signum());
-        let (slow_mps, rim_mps) = (0.5 * (left + right), 0.5 * (right - left));
-        // A turn on the spot may become a curve, in either direction.
-        let speeds: &[f64] = if forward_mps.abs() > 0.25 * fastest_mps {
-            &[1.0, 0.6, 0.3, 0.0]
+        let is_clear = |wheels: &Wheels| self.is_clear(here, *wheels, params.keep_away_m, params);
+        let clear = if forward_mps.abs() > 0.25 * fastest_mps {
+            curves(slow).into_iter().find(is_clear)
         } else {
-            &[0.0, 0.3, 0.6, -0.3, -0.6]
+            turns(slow, may_advance).into_iter().find(is_clear)
         };
-        let tries = speeds.iter().flat_map(|share| {
-            let mean_mps = share * SLOW_MPS * direction;
-            (-4..=4).map(move |turn| {
-                let rim_mps = 0.25 * f64::from(turn) * SLOW_MPS;
-                [mean_mps - rim_mps, mean_mps + rim_mps]
-            })
-        });
-        let cost = |[left, right]: &Wheels| {
-            let (mean, rim) = (0.5 * (left + right), 0.5 * (right - left));
-            3.0 * (mean - slow_mps).abs() + (rim - rim_mps).abs()
-        };
-        let mut tries: Vec<Wheels> = tries.filter(|[left, right]| left.abs() + right.abs() > 0.0).collect();
-        tries.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
-        let clear = tries.into_iter().find(|wheels| self.is_clear(here, *wheels, params.keep_away_m, params));
-        clear.map_or([0.0; 2], limited)
+        clear.unwrap_or([0.0; 2])
     }
 
     /// Whether, during the next moment, nothing seen comes nearer to the body than `margin_m`, or than it is already.
@@ -220,6 +210,36 @@ fn add(points: &mut Vec<Point>, now: Time, place: Point2<f64>) {
     }
 }
 
+/// A fan of slow motions in the direction of the wanted one: first what gets on best, and then what turns most alike.
+fn curves(wanted: Wheels) -> Vec<Wheels> {
+    let (mean_mps, rim_mps) = (0.5 * (wanted[0] + wanted[1]), 0.5 * (wanted[1] - wanted[0]));
+    let fan = [1.0, 0.6, 0.3, 0.0].into_iter().flat_map(|share| {
+        let mean_mps = share * SLOW_MPS.copysign(mean_mps);
+        (-4..=4).map(move |turn| {
+            let rim_mps = 0.25 * f64::from(turn) * SLOW_MPS;
+            limited([mean_mps - rim_mps, mean_mps + rim_mps])
+        })
+    });
+    let cost = |[left, right]: &Wheels| {
+        3.0 * (0.5 * (left + right) - mean_mps).abs() + (0.5 * (right - left) - rim_mps).abs()
+    };
+    let mut fan: Vec<Wheels> = fan.filter(|[left, right]| left.abs() + right.abs() > 0.0).collect();
+    fan.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+    fan
+}
+
+/// Instead of a turn on the spot: curves with the same turn, forwards; straight on if that may be; the same curves backwards.
+fn turns(wanted: Wheels, may_advance: bool) -> Vec<Wheels> {
+    let rim_mps = 0.5 * (wanted[1] - wanted[0]);
+    let curve = |mean_mps: f64| limited([mean_mps - rim_mps, mean_mps + rim_mps]);
+    let mut tries = vec![curve(0.5 * rim_mps.abs()), curve(rim_mps.abs())];
+    if may_advance {
+        tries.push([SLOW_MPS; 2]);
+    }
+    tries.extend([curve(-0.5 * rim_mps.abs()), curve(-rim_mps.abs())]);
+    tries
+}
+
 fn limited(wheels: Wheels) -> Wheels {
     let fastest_mps = wheels[0].abs().max(wheels[1].abs());
     if fastest_mps > SLOW_MPS { wheels.map(|speed| speed * SLOW_MPS / fastest_mps) } else { wheels }
@@ -231,4 +251,73 @@ fn distance_m(body: Pose2, place: Point2<f64>, params: &Params) -> f64 {
     let ahead_m = (local.x - params.hull_front_m).max(-params.hull_rear_m - local.x).max(0.0);
     let aside_m = (local.y.abs() - params.hull_side_m).max(0.0);
     ahead_m.hypot(aside_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+
+    fn coffee() -> Params {
+        let (hull_front_m, hull_rear_m, hull_side_m) = (0.305, 0.305, 0.255);
+        Params {
+            track_m: 0.4,
+            hull_front_m,
+            hull_rear_m,
+            hull_side_m,
+            keep_away_m: 0.08,
+            ..Params::default()
+        }
+    }
+
+    /// What is allowed at the origin of odometry, which is the map's too, between walls at these places across.
+    #[track_caller]
+    fn check(walls_m: &[f64], seen: &[(usize, f32)], wanted: Wheels, holds: impl Fn(Wheels) -> bool) {
+        let mut surround = Surround::default();
+        let line = |y_m: &f64| Segment::new(Point2::new(-3.0, *y_m), Point2::new(3.0, *y_m));
+        let walls: Vec<_> = walls_m.iter().map(line).collect();
+        let mut ranges = TofRanges { range_m: [2.0; TOF_COUNT], ..TofRanges::default() };
+        seen.iter().for_each(|(sensor, range_m)| ranges.range_m[*sensor] = *range_m);
+        for frame in 0..3 {
+            let now = Time::from_secs_f64(0.05 * f64::from(frame));
+            surround.observe(now, Some(Pose2::IDENTITY), Some((now, &ranges)), &coffee());
+            surround.show_walls(Some(Pose2::IDENTITY), &walls);
+        }
+        let allowed = surround.allowed(wanted, true, &coffee());
+        assert!(holds(allowed), "{wanted:?}: {allowed:?}");
+    }
+
+    const TURN: Wheels = [-0.1, 0.1];
+    const DRIVE: Wheels = [0.3, 0.3];
+
+    #[test]
+    fn motions_keep_away_from_walls_and_from_what_was_seen() {
+        check(&[], &[], TURN, |wheels| wheels == TURN);
+        check(&[], &[], DRIVE, |wheels| wheels == DRIVE);
+        // The corners need 0.40 m to turn.
+        check(&[0.6, -0.6], &[], TURN, |wheels| wheels == TURN);
+        check(&[0.37, -0.37], &[], TURN, |wheels| wheels[1] - wheels[0] < 0.05);
+        // A hallway that is just wide enough is driven through, slowly.
+        check(&[0.37, -0.37], &[], DRIVE, |[left, right]| left == right && left > 0.05 && left < 0.3);
+        // Something straight ahead stops the robot, or is steered around.
+        check(&[], &[(3, 0.1), (4, 0.1)], DRIVE, |[left, right]| 0.5 * (left + right) < 0.11);
+        // The end of a mail cart on the right: the rest of it is there although it is not seen.
+        check(&[1.0, -0.7], &[(1, 0.12)], [0.2, 0.02], |[left, right]| left - right < 0.1);
+    }
+
+    #[test]
+    fn what_passes_through_frees_what_was_seen() {
+        let mut surround = Surround::default();
+        let mut look = |tenths: u32, range_m: f32| {
+            let now = Time::from_secs_f64(0.1 * f64::from(tenths));
+            let ranges = TofRanges { range_m: [range_m; TOF_COUNT], ..TofRanges::default() };
+            surround.observe(now, Some(Pose2::new(0.0, 0.0, FRAC_PI_2)), Some((now, &ranges)), &coffee());
+            surround.points.len()
+        };
+        assert!(look(0, 0.4) >= TOF_COUNT);
+        assert!(look(1, 0.4) > 0);
+        assert!(look(2, 2.0) > 0, "one look past it does not free it");
+        let left = (3..=20).map(|tenths| look(tenths, 2.0)).last();
+        assert_eq!(left, Some(0));
+    }
 }

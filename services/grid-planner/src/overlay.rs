@@ -6,12 +6,16 @@ use geometry::{Point2, Pose2};
 use messages::{Reading, TOF_COUNT, Time, TofRanges};
 use std::time::Duration;
 
-/// A sighting counts for so many readings that pass: thin things are seen only now and then (COF-123).
-const SIGHTING: u8 = 3;
-/// What counts at most, so that an obstacle that leaves is forgotten soon.
+/// What a sighting adds to an obstacle's weight: thin things are seen only now and then (COF-123).
+const SIGHTING: u8 = 24;
+/// What weighs most, so that an obstacle that leaves is forgotten soon.
 const WEIGHT_MAX: u8 = 5 * SIGHTING;
-/// What lies in the outer part of a cone fills too little of it to be seen for sure: a reading frees only this share of its width.
+/// What lies in the outer part of a cone fills too little of it to be seen for sure: a reading that passes takes much weight within
+/// this share of its width, and little beside it, a cell beyond its edge included.
 const SURE_SHARE: f64 = 0.6;
+const SURE_PASS: u8 = 8;
+const UNSURE_SHARE: f64 = 1.3;
+const UNSURE_PASS: u8 = 2;
 /// The robot's body (COF-003), less the error of its pose: where it stands there is no obstacle.
 const BODY_M: [f64; 2] = [0.305 - 0.05, 0.255 - 0.05];
 /// As many obstacles are remembered; a ninth of a hallway's floor.
@@ -85,7 +89,7 @@ impl Overlay {
         }
         let margin_m = 2.0 * field.grid().resolution_m();
         let free = |place: Point2<f64>| {
-            looks.clone().any(|(eye, _, free_m)| surely_sees(rules, eye, free_m - margin_m, place))
+            looks.clone().any(|(eye, _, free_m)| sees(rules, eye, free_m - margin_m, place, SURE_SHARE))
         };
         for (eye, hit_m, _) in looks.clone() {
             let Some(hit_m) = hit_m else { continue };
@@ -134,23 +138,26 @@ impl Overlay {
     /// Marks that a reading passes lose weight; the last loss frees the cell.
     fn pass_through(&mut self, field: &mut Field, rules: &Rules, eye: Pose2, free_m: f64) {
         let margin_m = 2.0 * field.grid().resolution_m();
-        self.lighten(field, 1, |place| surely_sees(rules, eye, free_m - margin_m, place));
+        let sees = |place, share| sees(rules, eye, free_m - margin_m, place, share);
+        self.lighten(field, |place| match (sees(place, SURE_SHARE), sees(place, UNSURE_SHARE)) {
+            (true, _) => SURE_PASS,
+            (false, true) => UNSURE_PASS,
+            (false, false) => 0,
+        });
     }
 
     /// Where the robot stands nothing else does.
     fn free_below(&mut self, field: &mut Field, pose: Pose2) {
-        self.lighten(field, WEIGHT_MAX, |place| {
+        self.lighten(field, |place| {
             let inside = pose.inverse_transform(place);
-            inside.x.abs() < BODY_M[0] && inside.y.abs() < BODY_M[1]
+            if inside.x.abs() < BODY_M[0] && inside.y.abs() < BODY_M[1] { WEIGHT_MAX } else { 0 }
         });
     }
 
-    fn lighten(&mut self, field: &mut Field, by: u8, concerns: impl Fn(Point2<f64>) -> bool) {
+    fn lighten(&mut self, field: &mut Field, by: impl Fn(Point2<f64>) -> u8) {
         self.marks.retain_mut(|mark| {
             let [x_m, y_m] = field.grid().to_map(field.grid().centre(mark.cell));
-            if concerns(Point2::new(x_m, y_m)) {
-                mark.weight = mark.weight.saturating_sub(by);
-            }
+            mark.weight = mark.weight.saturating_sub(by(Point2::new(x_m, y_m)));
             if mark.weight == 0 && mark.blocks {
                 field.set_obstacle(mark.cell, false);
             }
@@ -159,10 +166,10 @@ impl Overlay {
     }
 }
 
-/// Whether a sensor that sees nothing nearer than `reach_m` would have seen a thing at `place`.
-fn surely_sees(rules: &Rules, eye: Pose2, reach_m: f64, place: Point2<f64>) -> bool {
+/// Whether a place lies in the inner `share` of a sensor's cone and nearer than `reach_m`.
+fn sees(rules: &Rules, eye: Pose2, reach_m: f64, place: Point2<f64>, share: f64) -> bool {
     let seen = eye.inverse_transform(place);
-    seen.x > 0.0 && seen.x < reach_m && seen.y.abs() <= SURE_SHARE * rules.half_cone_rad.tan() * seen.x
+    seen.x > 0.0 && seen.x < reach_m && seen.y.abs() <= share * rules.half_cone_rad.tan() * seen.x
 }
 
 /// The places across the cone at a reading's range, unless a known wall stands on the way to one of them or near it: then the reading

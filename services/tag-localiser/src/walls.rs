@@ -143,3 +143,37 @@ impl HallwayWalls {
         hits.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use messages::{RangeStatus, RangeStatusName};
+
+    /// Which sides are believed in a hallway with walls at ±0.85 m, by a robot in its middle that reads these side distances.
+    #[track_caller]
+    fn check(right_m: f32, left_m: f32, expected: [bool; 2]) {
+        let line = |y_m: f64| Segment::new(Point2::new(-9.0, y_m), Point2::new(9.0, y_m));
+        let walls = HallwayWalls::from_segments(2, [line(-0.85), line(0.85)]);
+        let best = Hypothesis::new(Pose2::IDENTITY, 0.05, 0.01, 0.0, 0.0);
+        let mut ranges = TofRanges::default();
+        for (sensor, range_m) in [(0, right_m), (1, right_m), (6, left_m), (7, left_m)] {
+            ranges.range_m[sensor] = range_m;
+            ranges.status[sensor] = RangeStatus::from(RangeStatusName::Valid);
+        }
+        let agreeing = walls.agreeing(&best, 2, &ranges, 0.03);
+        assert_eq!([agreeing.right, agreeing.left], expected, "{right_m} {left_m}");
+    }
+
+    #[test]
+    fn a_box_before_the_wall_is_not_the_wall() {
+        let wall_m = 0.85 - 0.255;
+        check(wall_m, wall_m, [true, true]);
+        // Shifted in the hallway: both sides say so.
+        check(wall_m - 0.1, wall_m + 0.1, [true, true]);
+        // One side alone: a little nearer, farther, and a box.
+        check(wall_m - 0.04, 2.0, [true, false]);
+        check(wall_m + 0.1, 2.0, [true, false]);
+        check(wall_m - 0.3, 2.0, [false, false]);
+        check(2.0, wall_m - 0.3, [false, false]);
+    }
+}
