@@ -180,13 +180,6 @@ impl FuzzyController {
 
         let max_age = Duration::from_millis(self.params.input_max_age_ms);
         let pose = inputs.pose.and_then(|pose| pose.fresh(now, max_age)).and_then(|pose| pose.pose().ok());
-        let wanted = match pose {
-            Some(pose) => self.decide(now, inputs, pose),
-            None => Decision::stand(Behaviour::BadInput),
-        };
-        let sound = wanted.wheels.iter().all(|speed| speed.is_finite());
-        let wanted = if sound { wanted } else { Decision::stand(Behaviour::BadInput) };
-
         let here = inputs.odometry.and_then(|way| way.fresh(now, max_age)).and_then(|way| way.pose().ok());
         let ranges = inputs.ranges.map(|ranges| (ranges.stamp, ranges.message));
         self.surround.observe(now, here, ranges, &self.params);
@@ -194,13 +187,21 @@ impl FuzzyController {
         let walls = self.walls.iter().find(|(number, _)| Some(*number) == floor);
         self.surround.show_walls(pose, walls.map_or(&[], |(_, walls)| walls.as_slice()));
 
+        let wanted = match pose {
+            Some(pose) => self.decide(now, inputs, pose),
+            None => Decision::stand(Behaviour::BadInput),
+        };
+        let sound = wanted.wheels.iter().all(|speed| speed.is_finite());
+        let wanted = if sound { wanted } else { Decision::stand(Behaviour::BadInput) };
+
         let slow_enough = limited(wanted.wheels, wanted.speed_limit_mps.min(self.params.top_speed_mps));
         // Only on a path, and not when it leads back.
         let may_advance = wanted.distance_m.is_finite() && wanted.error_rad.abs() < FRAC_PI_2;
-        let slow_enough = self.surround.allowed(slow_enough, may_advance, &self.params);
+        let allowed = self.surround.allowed(slow_enough, may_advance, &self.params);
+        self.surround.judge(now, slow_enough, allowed);
         let change_mps =
             if wanted.at_once { f64::INFINITY } else { self.params.acceleration_mps2 * elapsed_s };
-        self.wheels = eased(self.wheels, slow_enough, change_mps);
+        self.wheels = eased(self.wheels, allowed, change_mps);
         let [left_mps, right_mps] = self.wheels;
 
         let predicted = pose.map(|pose| {
@@ -261,6 +262,8 @@ impl FuzzyController {
             let scan = inputs.scan.and_then(|scan| scan.fresh(now, max_age))?;
             clearances = clearances.nearer(Clearances::of_scan(scan.message, scan.elements, &self.params)?);
         }
+        // Thin things flicker (COF-123): what was seen ahead a moment ago is still there.
+        clearances.front_m = clearances.front_m.min(self.surround.front_m(&self.params));
         Some(clearances).filter(|clearances| clearances.is_usable())
     }
 

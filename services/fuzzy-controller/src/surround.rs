@@ -37,6 +37,9 @@ const FURNITURE_M: f64 = 0.90;
 const FURNITURE_WITHIN_M: f64 = 0.45;
 const FURNITURE_POINTS: u32 = 9;
 const NONE_HERE_M: f64 = 0.03;
+/// A robot that can do nothing for the first time doubts what it only assumes, for the second.
+const STUCK_S: f64 = 3.0;
+const DOUBT_S: f64 = 4.0;
 const OFF_WALL_M: f64 = 0.12;
 const LONG_WALL_M: f64 = 1.0;
 /// A motion is tried for so long, in so many steps.
@@ -66,6 +69,8 @@ pub(crate) struct Surround {
     axis: Option<Vector2<f64>>,
     /// How far what was seen may reach beyond its seen end.
     assumed: Vec<Point>,
+    stuck_since: Option<Time>,
+    doubted_since: Option<Time>,
 }
 
 impl Surround {
@@ -89,6 +94,7 @@ impl Surround {
             near && !below && now.seconds_since(point.seen) <= KEPT_S
         };
         self.points.retain(is_kept);
+        self.doubted_since = self.doubted_since.filter(|since| now.seconds_since(*since) < DOUBT_S);
         self.assumed.retain(|point| is_kept(point) && distance_m(here, point.place, params) > NONE_HERE_M);
         let Some((stamp, ranges)) = ranges.filter(|(stamp, _)| self.frame != Some(*stamp)) else { return };
         self.frame = Some(stamp);
@@ -146,10 +152,35 @@ impl Surround {
             nearest.and_then(Segment::direction).map(|along| nalgebra::Rotation2::new(turn_rad) * along);
     }
 
+    /// Notices that the robot wants to move and may not, and doubts the assumptions then.
+    pub(crate) fn judge(&mut self, now: Time, wanted: Wheels, allowed: Wheels) {
+        if wanted == [0.0; 2] || allowed != [0.0; 2] {
+            self.stuck_since = None;
+            return;
+        }
+        let since = *self.stuck_since.get_or_insert(now);
+        if now.seconds_since(since) >= STUCK_S {
+            self.assumed.clear();
+            (self.stuck_since, self.doubted_since) = (None, Some(now));
+        }
+    }
+
+    /// From the hull's front edge to the nearest of what was seen straight ahead; infinite without any.
+    pub(crate) fn front_m(&self, params: &Params) -> f64 {
+        let Some(here) = self.here.filter(|_| params.keep_away_m > 0.0) else { return f64::INFINITY };
+        let local = self.points.iter().map(|point| here.inverse_transform(point.place));
+        let ahead = local.filter(|place| place.x > params.hull_front_m && place.y.abs() < params.hull_side_m);
+        ahead.map(|place| place.x - params.hull_front_m).fold(f64::INFINITY, f64::min)
+    }
+
     /// What was seen may go on along the wall, in the direction in which the robot drives.
     fn assume(&mut self, now: Time, here: Pose2, place: Point2<f64>, range_m: f64) {
         let off_wall = self.walls.iter().all(|wall| (wall - place).norm() > OFF_WALL_M);
-        let Some(axis) = self.axis.filter(|_| off_wall && range_m < FURNITURE_WITHIN_M) else { return };
+        let Some(axis) =
+            self.axis.filter(|_| off_wall && range_m < FURNITURE_WITHIN_M && self.doubted_since.is_none())
+        else {
+            return;
+        };
         let along = axis.dot(&Vector2::new(here.heading_rad.cos(), here.heading_rad.sin()));
         if along.abs() > 0.5 {
             for step in 1..=FURNITURE_POINTS {

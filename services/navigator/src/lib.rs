@@ -32,6 +32,8 @@ const STATUS_PERIOD_S: f64 = 0.2;
 const FRESH: Duration = Duration::from_millis(500);
 /// A remark about a refused order stands so long.
 const NOTICE_S: f64 = 10.0;
+/// There may be a way when the robot looks from farther back.
+const NO_WAY: &str = "there is no way to the goal";
 /// A pose missing for longer makes the robot plan anew when it is back.
 const LOST_S: f64 = 2.0;
 
@@ -277,7 +279,7 @@ impl Navigator {
         match self.watch.judge(now, pose, why, &self.params) {
             Remedy::None => wish,
             Remedy::Fault => Wish::STAND,
-            Remedy::BackOff if wish.mode == DriveModeName::Hold => wish,
+            Remedy::BackOff if wish.mode == DriveModeName::Hold && wish.hindrance != NO_WAY => wish,
             Remedy::BackOff => {
                 let speed_mps = self.params.back_off_speed_mps;
                 Wish { mode: DriveModeName::BackOff, speed_mps, heading_rad: pose.heading_rad, ..wish }

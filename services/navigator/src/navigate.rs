@@ -3,7 +3,7 @@
 use crate::building::{Lift, Spot};
 use crate::docking::{Docking, DockingStep, DockingView};
 use crate::mission::{Ride, Stage};
-use crate::{Navigator, Senses, Wish};
+use crate::{NO_WAY, Navigator, Senses, Wish};
 use geometry::{Pose2, angle};
 use messages::{CarState, DriveModeName, ElevatorCall, PlanRequest, PlanStateName};
 
@@ -338,7 +338,7 @@ impl Navigator {
                 speed_mps: self.params.travel_speed_mps,
                 hindrance: "the robot does not get on",
             },
-            Some(PlanStateName::Unreachable) => Wish::stand_because("there is no way to the goal"),
+            Some(PlanStateName::Unreachable) => Wish::stand_because(NO_WAY),
             Some(PlanStateName::InvalidGoal) => Wish::stand_because("something stands on the goal"),
             Some(PlanStateName::NoStart) => Wish::stand_because("the planner does not know the place"),
             Some(PlanStateName::Idle) | None => Wish::stand_because("the planner does not answer"),
