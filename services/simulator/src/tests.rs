@@ -382,14 +382,14 @@ fn refuses_nonsense_with_names_and_values() {
 }
 
 proptest! {
-    /// Whatever the motors are told, the truth stays finite, and the robot's middle within the hall.
+    /// Whatever the motors are told, the truth stays finite, and the robot's middle within the hall, with the niche of the elevator's door.
     #[test]
     fn nothing_drives_through_walls(commands in proptest::collection::vec((-1.2f64..1.2, -1.2f64..1.2, 0.1f64..2.0), 1..12)) {
         let mut run = Run::new(Params::default(), HALL);
         for (left_mps, right_mps, seconds) in commands {
             let truth = run.drive(left_mps, right_mps, seconds);
             prop_assert!(pose(&truth).is_finite());
-            prop_assert!((-1.0 + 0.25..=19.0 - 0.25).contains(&truth.x_m) && (-2.0 + 0.25..=2.0 - 0.25).contains(&truth.y_m), "{:?}", truth);
+            prop_assert!((-1.0 + 0.25..=19.0 - 0.25).contains(&truth.x_m) && (-2.0 + 0.15..=2.0 - 0.25).contains(&truth.y_m), "{:?}", truth);
         }
     }
 }
