@@ -288,7 +288,7 @@ impl FuzzyController {
                 (Behaviour::Brake, [0.0; 2])
             } else if !self.params.turns_by_path {
                 (Behaviour::Avoidance, self.turn_away(clearances))
-            } else if error_rad.abs() > self.params.rotation_begin_rad {
+            } else if error_rad.abs() > 2.0 * self.params.rotation_end_rad {
                 // The planner knows of the obstacle too, and its new path leads around it.
                 (Behaviour::Avoidance, self.rotate(error_rad))
             } else {

@@ -21,7 +21,7 @@ pub use params::{Algorithm, Params, ParamsError};
 pub use route::{Question, Router, length_m};
 pub use search::{DIAGONAL, STRAIGHT, Search};
 
-use geometry::{Pose2, World};
+use geometry::{Pose2, Segment, World};
 use messages::{
     Parameters, Path, PlanRequest, PlanState, PlanStateName, PoseEstimate, Stamped, Time, TofRanges, Waypoint,
 };
@@ -61,6 +61,8 @@ struct Active {
 pub struct GridPlanner {
     params: Params,
     floors: Vec<(i32, Field)>,
+    /// The closed leaves of the doors and elevators of each floor.
+    leaves: Vec<(i32, Vec<Segment>)>,
     router: Router,
     overlay: Overlay,
     /// The floor whose field holds the overlay.
@@ -77,14 +79,18 @@ impl GridPlanner {
     /// When a parameter or a file cannot be used.
     pub fn new(params: Params) -> Result<Self, ParamsError> {
         params.check()?;
+        let mut leaves = Vec::new();
         let grids = if !params.map.is_empty() {
             vec![(params.map_floor, floors::grid_of_map(&params)?)]
         } else if !params.world.is_empty() {
-            floors::grids(&World::load(&params.world)?, &params)?
+            let world = World::load(&params.world)?;
+            let of = |floor| world.openings_of(floor).map(|door| door.leaf).collect();
+            leaves = world.floors.iter().map(|floor| (floor.number, of(floor.number))).collect();
+            floors::grids(&world, &params)?
         } else {
             Vec::new()
         };
-        Self::with_grids(params, grids)
+        Ok(Self { leaves, ..Self::with_grids(params, grids)? })
     }
 
     /// The same with the floors' grids given.
@@ -98,6 +104,7 @@ impl GridPlanner {
         Ok(Self {
             params,
             floors,
+            leaves: Vec::new(),
             router: Router::default(),
             overlay: Overlay::default(),
             overlay_floor: None,
@@ -145,14 +152,16 @@ impl GridPlanner {
             self.overlay.clear(&mut self.floors[old].1);
         }
         self.overlay_floor = floor.or(self.overlay_floor);
-        let Some(field) = self.overlay_floor.map(|floor| &mut self.floors[floor].1) else { return };
+        let Some((number, field)) = self.overlay_floor.map(|floor| &mut self.floors[floor]) else { return };
         self.overlay.fade(field, &rules, now);
         let news = ranges
             .and_then(|ranges| ranges.fresh(now, self.params.input_max_age()))
             .filter(|ranges| self.ranges_seen.is_none_or(|seen| ranges.stamp > seen));
         if let (Some(ranges), Some((_, pose))) = (news, pose) {
             self.ranges_seen = Some(ranges.stamp);
-            self.overlay.observe(field, &rules, now, pose, ranges.message);
+            let leaves = self.leaves.iter().find(|(floor, _)| floor == number);
+            let leaves = leaves.map_or(&[][..], |(_, leaves)| leaves.as_slice());
+            self.overlay.observe((field, leaves), &rules, now, pose, ranges.message);
         }
     }
 
@@ -262,7 +271,7 @@ fn nearest_piece(waypoints: &[Waypoint], from: usize, pose: Pose2) -> Option<(us
     let pieces = waypoints.windows(2).enumerate().skip(from);
     pieces
         .map(|(piece, ends)| {
-            let line = geometry::Segment::new(place(&ends[0]), place(&ends[1]));
+            let line = Segment::new(place(&ends[0]), place(&ends[1]));
             (piece, line.distance_m(pose.position()))
         })
         .min_by(|a, b| a.1.total_cmp(&b.1))

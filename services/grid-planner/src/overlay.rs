@@ -2,7 +2,7 @@
 
 use crate::field::Field;
 use crate::line;
-use geometry::{Point2, Pose2};
+use geometry::{Point2, Pose2, Segment};
 use messages::{Reading, TOF_COUNT, Time, TofRanges};
 use std::time::Duration;
 
@@ -63,10 +63,10 @@ impl Overlay {
         }
     }
 
-    /// One frame of the sensors, taken at a pose.
+    /// One frame of the sensors, taken at a pose on a floor whose closed doors are `leaves`.
     pub(crate) fn observe(
         &mut self,
-        field: &mut Field,
+        (field, leaves): (&mut Field, &[Segment]),
         rules: &Rules,
         now: Time,
         pose: Pose2,
@@ -94,7 +94,7 @@ impl Overlay {
         for (eye, hit_m, _) in looks.clone() {
             let Some(hit_m) = hit_m else { continue };
             // It may stand anywhere across the cone, but for where a neighbour sees through; the rest is seen from nearer by.
-            if let Some(across) = unexplained(field, rules, eye, hit_m) {
+            if let Some(across) = unexplained((field, leaves), rules, eye, hit_m) {
                 let all_free = across.clone().all(free);
                 let mut last = None;
                 for end in across.filter(|end| all_free || !free(*end)) {
@@ -172,10 +172,10 @@ fn sees(rules: &Rules, eye: Pose2, reach_m: f64, place: Point2<f64>, share: f64)
     seen.x > 0.0 && seen.x < reach_m && seen.y.abs() <= share * rules.half_cone_rad.tan() * seen.x
 }
 
-/// The places across the cone at a reading's range, unless a known wall stands on the way to one of them or near it: then the reading
-/// is that wall. The range counts along the axis.
+/// The places across the cone at a reading's range, unless a known wall stands on the way to one of them or near it, or the closed leaf
+/// of a known door: then the reading is that wall, or a door that may open. The range counts along the axis.
 fn unexplained(
-    field: &Field,
+    (field, leaves): (&Field, &[Segment]),
     rules: &Rules,
     eye: Pose2,
     range_m: f64,
@@ -188,8 +188,10 @@ fn unexplained(
         eye.transform(Point2::new(range_m, aside_m))
     });
     let from = grid.to_cells([eye.x_m, eye.y_m]);
+    let is_leaf = |end: Point2<f64>| leaves.iter().any(|leaf| leaf.distance_m(end) < rules.wall_tolerance_m);
     let open = across.clone().all(|end| {
-        grid.index_at(end.x, end.y).is_some_and(|cell| field.wall_m(cell) >= rules.wall_tolerance_m)
+        !is_leaf(end)
+            && grid.index_at(end.x, end.y).is_some_and(|cell| field.wall_m(cell) >= rules.wall_tolerance_m)
             && line::visit(from, grid.to_cells([end.x, end.y]), |column, row| {
                 grid.checked_index(column, row).is_some_and(|cell| !grid.is_occupied(cell))
             })
