@@ -3,15 +3,16 @@
 //! Topics are made here, before any service lives, because a process that is killed while it makes one can leave it unusable
 //! for ever. Services only open them.
 
+use crate::janitor;
 use crate::manifest::Manifest;
-use crate::place::{self, InvalidBoardName, Place};
+use crate::place::{self, InvalidBoardName, Place, Turn};
 use crate::switchboard::{self, SlotState, Switchboard};
 use crate::transport::{Member, RawTopic, TopicShape, TransportError};
 use rustix::fs::{FlockOperation, flock};
 use std::fs::{File, OpenOptions};
 use std::io;
-use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
-use std::path::Path;
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -60,9 +61,11 @@ pub struct Host {
     place: Place,
     switchboard: Switchboard,
     manifest: Manifest,
+    topics: Vec<RawTopic>,
+    member: Option<Member>,
+    taken_down: bool,
+    /// Held as long as the board is up; the kernel lets go of it however this process ends.
     _lock: File,
-    _topics: Vec<RawTopic>,
-    _member: Member,
 }
 
 impl std::fmt::Debug for Host {
@@ -81,14 +84,22 @@ impl Host {
         if manifest.topics.len() > switchboard::TOPICS {
             return Err(HostError::TooManyTopics { topics: manifest.topics.len() });
         }
+        let _turn = Turn::take()?;
         if let Some(pid) = living_launcher(&place) {
             return Err(HostError::Taken { board: name.to_owned(), pid });
         }
-        clear(&place)?;
+        clear_away(&place)?;
         place.create()?;
+        Self::furnish(place.clone(), manifest, lockstep).inspect_err(|_| {
+            let _ = place.remove();
+        })
+    }
+
+    fn furnish(place: Place, manifest: Manifest, lockstep: bool) -> Result<Self, HostError> {
         let lock =
             OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(place.file(LOCK))?;
-        flock(&lock, FlockOperation::NonBlockingLockExclusive).map_err(io::Error::from)?;
+        // It is ours but for the instant in which somebody looks whether it is held.
+        flock(&lock, FlockOperation::LockExclusive).map_err(io::Error::from)?;
         use std::io::Write as _;
         writeln!(&lock, "{}", std::process::id())?;
         let switchboard = Switchboard::create(&place.file(SWITCHBOARD))?;
@@ -105,7 +116,15 @@ impl Host {
         }
         let manifest = Manifest { launcher_pid: std::process::id(), ..manifest };
         manifest.write(&place)?;
-        Ok(Self { place, switchboard, manifest, _lock: lock, _topics: topics, _member: member })
+        Ok(Self {
+            place,
+            switchboard,
+            manifest,
+            topics,
+            member: Some(member),
+            taken_down: false,
+            _lock: lock,
+        })
     }
 
     /// Where it lies.
@@ -157,21 +176,37 @@ impl Host {
     ///
     /// # Errors
     /// When a file cannot be removed.
-    pub fn take_down(self) -> io::Result<()> {
-        let Self { place, switchboard, _lock: lock, _topics: topics, _member: member, .. } = self;
-        drop(topics);
-        drop(member);
-        drop(switchboard);
-        let removed = place.remove();
-        drop(lock);
-        removed
+    pub fn take_down(mut self) -> io::Result<()> {
+        self.remove()
+    }
+
+    fn remove(&mut self) -> io::Result<()> {
+        self.taken_down = true;
+        self.topics.clear();
+        self.member = None;
+        let _turn = Turn::take()?;
+        self.place.remove()
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        if !self.taken_down
+            && let Err(error) = self.remove()
+        {
+            tracing::warn!(board = self.place.name(), %error, "something of the board is left behind");
+        }
     }
 }
 
 /// The process of the launcher that holds this board, if it lives.
 pub fn living_launcher(place: &Place) -> Option<u32> {
+    if !place.exists() {
+        return None;
+    }
     let lock = OpenOptions::new().read(true).write(true).open(place.file(LOCK)).ok()?;
-    match flock(&lock, FlockOperation::NonBlockingLockExclusive) {
+    // Shared, so that two who look at the same time do not take each other for the launcher.
+    match flock(&lock, FlockOperation::NonBlockingLockShared) {
         Ok(()) => None,
         Err(_) => Some(std::fs::read_to_string(place.file(LOCK)).ok()?.trim().parse().unwrap_or(0)),
     }
@@ -180,7 +215,7 @@ pub fn living_launcher(place: &Place) -> Option<u32> {
 /// What was found of a board whose launcher is gone.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Swept {
-    /// The board.
+    /// The board; empty for shared memory whose board is not known any more.
     pub board: String,
     /// Services that were still there and were ended: name and process.
     pub ended: Vec<(String, u32)>,
@@ -193,25 +228,41 @@ pub struct Swept {
 /// # Errors
 /// When something cannot be removed.
 pub fn sweep() -> io::Result<Vec<Swept>> {
+    let _turn = Turn::take()?;
     let mut swept = Vec::new();
     for place in place::places() {
         if living_launcher(&place).is_none() {
-            swept.extend(clear(&place)?);
+            swept.extend(clear_away(&place)?);
         }
+    }
+    let orphans = place::orphans();
+    if !orphans.is_empty() {
+        for file in &orphans {
+            std::fs::remove_file(file)?;
+        }
+        swept.push(Swept { board: String::new(), ended: Vec::new(), files: orphans.len() });
     }
     Ok(swept)
 }
 
-/// Clears away what is left of a board whose launcher is gone.
+/// Clears away what is left of a board whose launcher is gone; a board that is up stays as it is.
 ///
 /// # Errors
 /// When something cannot be removed.
 pub fn clear(place: &Place) -> io::Result<Option<Swept>> {
+    let _turn = Turn::take()?;
+    if living_launcher(place).is_some() {
+        return Ok(None);
+    }
+    clear_away(place)
+}
+
+fn clear_away(place: &Place) -> io::Result<Option<Swept>> {
     let shared_memory = place.shared_memory().len();
     if !place.exists() && shared_memory == 0 {
         return Ok(None);
     }
-    let ended = end_services(place);
+    let ended = if place.exists() { end_services(place) } else { Vec::new() };
     let files = shared_memory + count_files(place.root());
     place.remove()?;
     Ok(Some(Swept { board: place.name().to_owned(), ended, files }))
@@ -254,6 +305,7 @@ fn end_services(place: &Place) -> Vec<(String, u32)> {
 fn is_of_board(pid: u32, place: &Place) -> bool {
     let page = place.file(SWITCHBOARD);
     pid != 0
+        && pid != std::process::id()
         && switchboard::process_lives(pid)
         && std::fs::read_to_string(format!("/proc/{pid}/maps"))
             .is_ok_and(|maps| maps.lines().any(|line| line.ends_with(&*page.to_string_lossy())))
@@ -274,34 +326,18 @@ fn count_files(folder: &Path) -> usize {
 /// When the board cannot be joined.
 pub fn clean_dead(name: &str) -> Result<usize, HostError> {
     let place = Place::new(name)?;
-    // Whoever died while making a file leaves it half made, and the transport waits for its end.
-    remove_half_made(&place, Duration::from_secs(1));
-    let member = Member::join(&place)?;
-    Ok(member.clean())
+    // Those who died while they made a file leave it half made, and the transport, here and in the services, waits for its end.
+    let failed = janitor::beside(&place, || Member::join(&place).map(|member| member.clean()))?;
+    if let Ok(switchboard) = Switchboard::open(&place.file(SWITCHBOARD)) {
+        let dead: Vec<u32> = switchboard.dead_tools().map(|(index, _)| index).collect();
+        dead.into_iter().for_each(|index| switchboard.release_dead(index));
+    }
+    Ok(failed)
 }
 
-/// Removes files that a dead process has begun and not finished: write-protected when whole, they are still writable.
-fn remove_half_made(place: &Place, age: Duration) {
-    let old = |path: &Path| {
-        let modified = std::fs::symlink_metadata(path).and_then(|found| found.modified());
-        modified.is_ok_and(|time| time.elapsed().is_ok_and(|passed| passed >= age))
-    };
-    let mode = |path: &Path| std::fs::symlink_metadata(path).map_or(0, |found| found.mode() & 0o777);
-    for file in place.shared_memory() {
-        if mode(&file) == 0o200 && old(&file) {
-            let _ = std::fs::remove_file(file);
-        }
-    }
-    let nodes = place.file("nodes");
-    for folder in
-        std::fs::read_dir(&nodes).into_iter().flatten().flatten().filter(|entry| entry.path().is_dir())
-    {
-        let id = folder.file_name().to_string_lossy().into_owned();
-        let monitor = nodes.join(format!("{}{id}.node_monitor", place.prefix()));
-        if !monitor.exists() && old(&folder.path()) {
-            let _ = std::fs::remove_dir_all(folder.path());
-        }
-    }
+/// Shared memory of a board that was begun by a process which is dead; [`clean_dead`] removes it.
+pub fn half_made(place: &Place) -> Vec<PathBuf> {
+    janitor::half_made(place)
 }
 
 /// Every service of the page, for those who look.

@@ -13,6 +13,7 @@ pub mod tap;
 mod example;
 mod health;
 mod interface;
+mod janitor;
 mod kept;
 mod node;
 mod port;

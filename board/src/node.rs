@@ -110,7 +110,15 @@ impl Joined {
             (Some(_), Some(slot)) => slot.generation.load(Ordering::Acquire),
             _ => 0,
         };
-        let member = Member::join(&place)?;
+        // The launcher writes this too, but may die before it comes to it; then whoever clears the board away finds us here.
+        if let Some(slot) = switchboard.slot(slot) {
+            slot.pid.store(std::process::id(), Ordering::Release);
+        }
+        let member = Member::join(&place).inspect_err(|_| {
+            if prepared.is_none() {
+                switchboard.release(slot);
+            }
+        })?;
         let shared = Rc::new(Shared::new(switchboard, slot, generation));
         Ok(Self { shared, manifest, member, place, publishers: Vec::new() })
     }

@@ -66,7 +66,7 @@ impl Place {
 
     /// Whether a folder of this board exists.
     pub fn exists(&self) -> bool {
-        self.root.exists()
+        own_folder(&boards_folder()).is_ok() && own_folder(&self.root).is_ok()
     }
 
     /// Makes the folder, for its owner alone.
@@ -75,25 +75,11 @@ impl Place {
     /// When it exists, belongs to another user, or cannot be made.
     pub fn create(&self) -> io::Result<()> {
         let folder = boards_folder();
-        match fs::DirBuilder::new().mode(0o700).create(&folder) {
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-                // Somebody else may have made it first, to look into our boards.
-                let found = fs::symlink_metadata(&folder)?;
-                let user = rustix::process::getuid().as_raw();
-                if !found.is_dir() || found.uid() != user {
-                    return Err(io::Error::new(
-                        io::ErrorKind::PermissionDenied,
-                        format!("{} does not belong to this user; remove it", folder.display()),
-                    ));
-                }
-                fs::set_permissions(&folder, fs::Permissions::from_mode(0o700))?;
-            }
-            other => other?,
-        }
+        make_boards_folder(&folder)?;
         fs::DirBuilder::new().mode(0o700).create(&self.root)
     }
 
-    /// Removes everything that lies here, used or not. Only for a board whose processes are gone.
+    /// Removes everything that lies here, used or not. Only for a board whose processes are gone, and by whoever has the [`Turn`].
     ///
     /// # Errors
     /// When a file cannot be removed.
@@ -101,9 +87,12 @@ impl Place {
         for file in self.shared_memory() {
             ignore_missing(fs::remove_file(file))?;
         }
+        // Everybody may write into /dev/shm. A folder that is not ours, or a link, could lead anywhere.
+        match own_folder(&boards_folder()) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            other => _ = other?,
+        }
         ignore_missing(fs::remove_dir_all(&self.root))?;
-        // The last board takes the folder along; it stays while others are in it.
-        let _ = fs::remove_dir(boards_folder());
         Ok(())
     }
 
@@ -119,14 +108,120 @@ impl Place {
 
 /// The boards of this user that have a folder, in order of their names.
 pub fn places() -> Vec<Place> {
-    let Ok(entries) = fs::read_dir(boards_folder()) else { return Vec::new() };
-    let mut places: Vec<Place> =
-        entries.flatten().filter_map(|entry| Place::new(entry.file_name().to_str()?).ok()).collect();
+    let folder = boards_folder();
+    if own_folder(&folder).is_err() {
+        return Vec::new();
+    }
+    let Ok(entries) = fs::read_dir(folder) else { return Vec::new() };
+    let mut places: Vec<Place> = entries
+        .flatten()
+        .filter_map(|entry| Place::new(entry.file_name().to_str()?).ok())
+        .filter(Place::exists)
+        .collect();
     places.sort();
     places
 }
 
-fn boards_folder() -> PathBuf {
+/// Shared memory of this user's boards that belongs to no folder: somebody removed the folder by hand. Ask for it under [`Turn`] only, or
+/// it may belong to a board that is being taken down.
+pub fn orphans() -> Vec<PathBuf> {
+    let prefixes: Vec<String> = places().into_iter().map(|place| place.prefix).collect();
+    let user = rustix::process::getuid().as_raw();
+    let Ok(entries) = fs::read_dir("/dev/shm") else { return Vec::new() };
+    entries
+        .flatten()
+        .filter(|entry| {
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            is_prefixed(&name)
+                && !prefixes.iter().any(|prefix| name.starts_with(prefix.as_str()))
+                && entry.metadata().is_ok_and(|found| found.is_file() && found.uid() == user)
+        })
+        .map(|entry| entry.path())
+        .collect()
+}
+
+/// Whether a name in shared memory begins as a board's memory does: `c`, eight hexadecimal digits, `_`.
+fn is_prefixed(name: &str) -> bool {
+    let bytes = name.as_bytes();
+    bytes.len() > 10
+        && bytes[0] == b'c'
+        && bytes[9] == b'_'
+        && bytes[1..9].iter().all(|byte| byte.is_ascii_digit() || (b'a'..=b'f').contains(byte))
+}
+
+/// The turn to make or to clear away boards: one process of the user at a time, so that nobody clears away a board that another is just making.
+#[derive(Debug)]
+pub struct Turn {
+    _folder: fs::File,
+}
+
+impl Turn {
+    /// Waits for the turn.
+    ///
+    /// # Errors
+    /// When the folder of the boards belongs to another user, or cannot be made.
+    pub fn take() -> io::Result<Self> {
+        let folder = boards_folder();
+        loop {
+            make_boards_folder(&folder)?;
+            let file = match fs::File::open(&folder) {
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                other => other?,
+            };
+            rustix::fs::flock(&file, rustix::fs::FlockOperation::LockExclusive)?;
+            // Whoever took down the last board meanwhile has removed the folder that we hold.
+            if fs::symlink_metadata(&folder)
+                .is_ok_and(|found| file.metadata().is_ok_and(|ours| ours.ino() == found.ino()))
+            {
+                return Ok(Self { _folder: file });
+            }
+        }
+    }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        // Only an empty folder goes.
+        let _ = fs::remove_dir(boards_folder());
+    }
+}
+
+fn make_boards_folder(folder: &Path) -> io::Result<()> {
+    match fs::DirBuilder::new().mode(0o700).create(folder) {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+            match own_folder(folder) {
+                // Removed by another process just now; whoever needs it tries again.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+                Err(error) => Err(error),
+                Ok(0o700) => Ok(()),
+                Ok(_) => fs::set_permissions(folder, fs::Permissions::from_mode(0o700)),
+            }
+        }
+        other => other,
+    }
+}
+
+/// The mode of a folder, which must be one, and this user's: somebody else may have made it first, to look into our boards, or to have
+/// their files removed by us.
+fn own_folder(folder: &Path) -> io::Result<u32> {
+    let found = fs::symlink_metadata(folder)?;
+    let user = rustix::process::getuid().as_raw();
+    if found.is_dir() && found.uid() == user {
+        return Ok(found.mode() & 0o777);
+    }
+    Err(io::Error::new(
+        io::ErrorKind::PermissionDenied,
+        format!(
+            "{} is not a folder of this user (it belongs to user {}); remove it, or have it removed",
+            folder.display(),
+            found.uid()
+        ),
+    ))
+}
+
+/// The folder in which the boards of this user lie.
+pub fn boards_folder() -> PathBuf {
     // Shared memory rather than the temporary directory: three times faster to set up, and gone after a power loss.
     PathBuf::from(format!("/dev/shm/corkboard-{}", rustix::process::getuid().as_raw()))
 }

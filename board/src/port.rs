@@ -56,7 +56,8 @@ impl ReaderLink {
         if let Some(last) = self.sequence
             && sequence > last
         {
-            self.shared.lost.set(self.shared.lost.get() + (sequence - last - 1));
+            // A sequence is data: a forged one must not overflow the count.
+            self.shared.lost.set(self.shared.lost.get().saturating_add(sequence - last - 1));
         }
         self.sequence = Some(sequence);
     }
@@ -211,7 +212,7 @@ impl PublisherLink {
         generation: u32,
     ) -> Result<(), TransportError> {
         let Some(entry) = self.shared.switchboard.topic(self.topic) else { return Ok(()) };
-        let sequence = entry.count.load(Ordering::Relaxed) + 1;
+        let sequence = entry.count.load(Ordering::Relaxed).wrapping_add(1);
         loan.send(Envelope {
             stamp_ns: stamp.as_nanos(),
             origin_ns: origin.as_nanos(),
@@ -266,7 +267,13 @@ impl<T: Message> Publisher<T> {
         };
         let link = self.link.as_ref()?;
         match link.loan(bytes) {
-            Ok(raw) => Some(Loan { raw, link, name: &self.name, elements, marker: PhantomData }),
+            Ok(mut raw) => {
+                // The bytes between the fixed part and the elements belong to neither; equal messages shall be equal bytes.
+                if T::HAS_ELEMENTS {
+                    raw.bytes()[size_of::<T>()..elements_offset(size_of::<T>())].fill(0);
+                }
+                Some(Loan { raw, link, name: &self.name, elements, marker: PhantomData })
+            }
             Err(error) => {
                 tracing::error!(topic = self.name, %error, "message lost");
                 None

@@ -20,7 +20,7 @@ use std::time::Duration;
 pub const SLOTS: usize = 128;
 /// Topics on one board at the most.
 pub const TOPICS: usize = 256;
-const MAGIC: u64 = 0x6b72_6f63_0000_0003;
+const MAGIC: u64 = 0x6b72_6f63_0000_0004;
 const ROLE_BYTES: usize = 48;
 /// Stands for no slot.
 pub const NO_SLOT: u32 = u32::MAX;
@@ -82,6 +82,9 @@ pub struct Header {
 #[derive(Debug)]
 pub struct Slot {
     state: AtomicU32,
+    /// The process that has claimed the slot: a tool for itself, the launcher for a service; zero when it is free. Whoever wins this word owns
+    /// the rest, and a slot whose owner is dead can be taken over, at whatever instant the owner died.
+    owner: AtomicU32,
     /// Its process number.
     pub pid: AtomicU32,
     /// Given by the launcher at each start; decides whose messages count.
@@ -150,7 +153,8 @@ impl Switchboard {
     /// When the file exists or cannot be mapped.
     pub fn create(path: &Path) -> io::Result<Self> {
         let file = OpenOptions::new().read(true).write(true).create_new(true).mode(0o600).open(path)?;
-        file.set_len(size_of::<Page>() as u64)?;
+        // Reserved, not only sized: with shared memory full, this fails, and not the first write into the page (SIGBUS).
+        rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, size_of::<Page>() as u64)?;
         let board = Self::map(&file)?;
         for topic in 0..TOPICS {
             board.page().topics[topic].publisher.store(NO_SLOT, Ordering::Relaxed);
@@ -219,25 +223,26 @@ impl Switchboard {
 
     /// Takes a free slot for a process, or `None` when all are taken by living ones.
     pub fn claim(&self, role: &str, pid: u32, is_service: bool) -> Option<u32> {
+        // Looking a process up costs a file, so the slots of the dead come last.
+        let index = self.claim_where(|owner| owner == 0).or_else(|| {
+            // A tool that was killed cannot give its slot back.
+            self.claim_where(|owner| owner != 0 && !process_lives(owner))
+        })?;
+        let slot = self.slot(index)?;
+        self.silence(index);
+        slot.is_service.store(u32::from(is_service), Ordering::Relaxed);
+        slot.set_role(role);
+        slot.reset(pid);
+        Some(index)
+    }
+
+    fn claim_where(&self, takeable: impl Fn(u32) -> bool) -> Option<u32> {
+        let claimer = std::process::id();
         (0..SLOTS as u32).find(|&index| {
-            let slot = &self.page().slots[index as usize];
-            let state = slot.state.load(Ordering::Acquire);
-            let free = SlotState::of(state) == SlotState::Free
-                // A tool that was killed cannot give its slot back.
-                || (slot.is_service.load(Ordering::Relaxed) == 0 && !process_lives(slot.pid.load(Ordering::Relaxed)));
-            if !free
-                || slot
-                    .state
-                    .compare_exchange(state, SlotState::Starting as u32, Ordering::AcqRel, Ordering::Relaxed)
-                    .is_err()
-            {
-                return false;
-            }
-            self.silence(index);
-            slot.is_service.store(u32::from(is_service), Ordering::Relaxed);
-            slot.reset(pid);
-            slot.set_role(role);
-            true
+            let owner_word = &self.page().slots[index as usize].owner;
+            let owner = owner_word.load(Ordering::Acquire);
+            takeable(owner)
+                && owner_word.compare_exchange(owner, claimer, Ordering::AcqRel, Ordering::Relaxed).is_ok()
         })
     }
 
@@ -245,7 +250,24 @@ impl Switchboard {
     pub fn release(&self, index: u32) {
         self.silence(index);
         if let Some(slot) = self.slot(index) {
+            slot.pid.store(0, Ordering::Relaxed);
             slot.state.store(SlotState::Free as u32, Ordering::Release);
+            slot.owner.store(0, Ordering::Release);
+        }
+    }
+
+    /// Gives back the slot of a tool that died. Somebody else may be taking it over at this moment; one of the two wins.
+    pub fn release_dead(&self, index: u32) {
+        let Some(slot) = self.slot(index) else { return };
+        let owner = slot.owner.load(Ordering::Acquire);
+        if owner != 0
+            && !process_lives(owner)
+            && slot
+                .owner
+                .compare_exchange(owner, std::process::id(), Ordering::AcqRel, Ordering::Relaxed)
+                .is_ok()
+        {
+            self.release(index);
         }
     }
 
@@ -277,6 +299,13 @@ impl Switchboard {
                 slot.ring();
             }
         }
+    }
+
+    /// Slots of tools that have died without giving them back.
+    pub fn dead_tools(&self) -> impl Iterator<Item = (u32, &Slot)> {
+        self.taken().filter(|(_, slot)| {
+            slot.is_service.load(Ordering::Relaxed) == 0 && !process_lives(slot.owner.load(Ordering::Acquire))
+        })
     }
 
     /// Slots that are not free, with their numbers.

@@ -8,12 +8,14 @@ use crate::port::{PublisherLink, ReaderLink};
 use crate::switchboard::{SlotState, Switchboard};
 use crate::transport::{Envelope, RawMessage};
 use messages::Time;
+use std::cell::Cell;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// A tool's place on a board.
 pub struct Tap {
     joined: Joined,
+    topology: Cell<u32>,
 }
 
 impl std::fmt::Debug for Tap {
@@ -35,7 +37,7 @@ impl Tap {
         if let Some(slot) = joined.shared.own_slot() {
             slot.set_state(SlotState::Running);
         }
-        Ok(Self { joined })
+        Ok(Self { joined, topology: Cell::new(0) })
     }
 
     /// The board's table of contents.
@@ -72,7 +74,12 @@ impl Tap {
     }
 
     /// Sleeps until a topic that is read has a new message, at most for `timeout`. Look for messages first: `heard` is the bell before the look.
+    /// Readers that have joined since get the last message of each publisher of this tap.
     pub fn wait(&self, heard: u32, timeout: Duration) {
+        let topology = self.switchboard().header().topology.load(Ordering::Acquire);
+        if self.topology.replace(topology) != topology {
+            self.joined.publishers.iter().for_each(|link| link.publisher.update());
+        }
         if let Some(slot) = self.joined.shared.own_slot() {
             slot.heartbeat_ns.store(clock::monotonic().as_nanos(), Ordering::Relaxed);
             slot.wait(heard, Some(timeout));
@@ -146,7 +153,8 @@ impl TapPublisher {
     pub fn publish(&self, bytes: &[u8]) -> Result<(), crate::transport::TransportError> {
         let mut loan = self.link.loan(bytes.len())?;
         loan.bytes().copy_from_slice(bytes);
-        let now = clock::monotonic();
+        // Host time would lie in a lockstep's far future, and block the readers for ever.
+        let now = now(&self.link.shared.switchboard);
         self.link.send_as_outsider(loan, now)
     }
 }

@@ -1,0 +1,384 @@
+//! `board doctor`: is this machine fit, and are its boards well?
+
+use crate::connect::{Life, life};
+use crate::{Common, Outcome, show};
+use board::clock;
+use board::host::{half_made, living_launcher};
+use board::manifest::Manifest;
+use board::place::{Place, boards_folder, orphans, places};
+use board::switchboard::{SlotState, Switchboard};
+use messages::Time;
+use rustix::process::{Resource, getrlimit, getuid};
+use std::os::unix::fs::MetadataExt as _;
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+/// A service that has not looked about for so long hangs, or starves.
+const SILENT: Duration = Duration::from_secs(1);
+const MIB: u64 = 1024 * 1024;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Verdict {
+    Ok,
+    Warn,
+    Problem,
+}
+
+#[derive(Debug, serde::Serialize)]
+struct Finding {
+    check: String,
+    verdict: Verdict,
+    found: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    advice: Option<String>,
+}
+
+fn ok(check: &str, found: impl Into<String>) -> Finding {
+    Finding { check: check.into(), verdict: Verdict::Ok, found: found.into(), advice: None }
+}
+
+fn warn(check: &str, found: impl Into<String>, advice: impl Into<String>) -> Finding {
+    Finding { check: check.into(), verdict: Verdict::Warn, found: found.into(), advice: Some(advice.into()) }
+}
+
+fn problem(check: &str, found: impl Into<String>, advice: impl Into<String>) -> Finding {
+    Finding {
+        check: check.into(),
+        verdict: Verdict::Problem,
+        found: found.into(),
+        advice: Some(advice.into()),
+    }
+}
+
+pub(crate) fn run(common: &Common) -> Outcome {
+    let mut findings = vec![shared_memory(), folder(), user()];
+    findings.extend(limits());
+    findings.extend(clocks());
+    findings.extend(boards());
+    let problems = findings.iter().filter(|finding| finding.verdict == Verdict::Problem).count();
+    if common.json {
+        show::json(&serde_json::to_value(&findings)?)?;
+    } else {
+        print(&findings)?;
+    }
+    Ok(if problems > 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+fn print(findings: &[Finding]) -> std::io::Result<()> {
+    let colours = show::colours();
+    let width = findings.iter().map(|finding| finding.check.chars().count()).max().unwrap_or(0);
+    for Finding { check, verdict, found, advice } in findings {
+        let verdict = match verdict {
+            Verdict::Ok => show::good(colours, "ok     "),
+            Verdict::Warn => show::doubtful(colours, "warn   "),
+            Verdict::Problem => show::bad(colours, "problem"),
+        };
+        show::line(&format!("{verdict}  {check:<width$}  {found}"))?;
+        if let Some(advice) = advice {
+            show::line(&format!("         {:<width$}  -> {advice}", ""))?;
+        }
+    }
+    Ok(())
+}
+
+fn shared_memory() -> Finding {
+    const CHECK: &str = "shared memory";
+    let Ok(found) = rustix::fs::statvfs("/dev/shm") else {
+        return problem(CHECK, "/dev/shm is missing", "mount a tmpfs there: `mount -t tmpfs tmpfs /dev/shm`");
+    };
+    let mounts = std::fs::read_to_string("/proc/self/mounts").unwrap_or_default();
+    let is_tmpfs = mounts.lines().any(|line| {
+        let mut words = line.split(' ').skip(1);
+        words.next() == Some("/dev/shm") && words.next() == Some("tmpfs")
+    });
+    let (size, free) = (found.f_blocks * found.f_frsize, found.f_bavail * found.f_frsize);
+    let text = format!("/dev/shm has {} free of {}", show::bytes(free), show::bytes(size));
+    let larger = "enlarge it: `mount -o remount,size=1G /dev/shm` (in a container: --shm-size=1g)";
+    if free < 32 * MIB {
+        // A page that cannot be had when it is first touched kills the process that touches it.
+        problem(
+            CHECK,
+            text,
+            format!("a process that touches a page more than there is dies of SIGBUS; {larger}"),
+        )
+    } else if !is_tmpfs {
+        warn(
+            CHECK,
+            format!("{text}, and is no tmpfs"),
+            "on a disk, messages may wait for it; mount a tmpfs there",
+        )
+    } else if free < 256 * MIB {
+        warn(CHECK, text, format!("images and maps need tens of MiB a topic; {larger}"))
+    } else {
+        ok(CHECK, text)
+    }
+}
+
+fn folder() -> Finding {
+    const CHECK: &str = "boards' folder";
+    let folder = boards_folder();
+    let Ok(found) = std::fs::symlink_metadata(&folder) else {
+        return ok(CHECK, format!("{} is not there: no board is up", folder.display()));
+    };
+    let (mode, owner) = (found.mode() & 0o777, found.uid());
+    if !found.is_dir() || owner != getuid().as_raw() {
+        let text = format!("{} is no folder of this user (owner {owner})", folder.display());
+        return problem(
+            CHECK,
+            text,
+            "somebody else made it, and no board can start; have its owner or root remove it",
+        );
+    }
+    if mode & 0o077 != 0 {
+        let text = format!("{} has mode {mode:o}: others can look into it", folder.display());
+        return warn(CHECK, text, format!("chmod 700 {}", folder.display()));
+    }
+    ok(CHECK, format!("{} belongs to this user alone", folder.display()))
+}
+
+fn user() -> Finding {
+    const CHECK: &str = "user";
+    let others: Vec<String> = std::fs::read_dir("/dev/shm")
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|name| name.starts_with("corkboard-") && *name != format!("corkboard-{}", getuid().as_raw()))
+        .collect();
+    let others = if others.is_empty() {
+        String::new()
+    } else {
+        format!("; other users' boards: {}", others.join(", "))
+    };
+    if getuid().is_root() {
+        let text = format!("running as root{others}");
+        return warn(
+            CHECK,
+            text,
+            "a board of root's locks every other user out; run the robot as a user of its own",
+        );
+    }
+    ok(CHECK, format!("user {}{others}", getuid().as_raw()))
+}
+
+fn limits() -> Vec<Finding> {
+    let soft = |resource| getrlimit(resource).current;
+    let text = |limit: Option<u64>| limit.map_or("no limit".to_owned(), |limit| limit.to_string());
+    let files = soft(Resource::Nofile);
+    let mut findings = vec![if files.is_some_and(|files| files < 1024) {
+        problem(
+            "open files",
+            format!("{} a process", text(files)),
+            "each port of a service opens a few; `ulimit -n 4096`, or LimitNOFILE=4096 in the unit",
+        )
+    } else {
+        ok("open files", format!("{} a process", text(files)))
+    }];
+    // Root, and whoever has the capability, needs no limit raised.
+    let capable = getuid().is_root() || has_capability(23);
+    let priority = soft(Resource::Rtprio);
+    findings.push(if capable || priority.is_none_or(|priority| priority >= 50) {
+        ok("real-time priority", if capable { "allowed".to_owned() } else { format!("up to {}", text(priority)) })
+    } else {
+        warn(
+            "real-time priority",
+            format!("limited to {}", text(priority)),
+            "only for graphs with `priority = { fifo = .. }`: a line `USER - rtprio 80` in /etc/security/limits.conf",
+        )
+    });
+    let locked = soft(Resource::Memlock);
+    findings.push(if getuid().is_root() || locked.is_none_or(|bytes| bytes >= 64 * MIB) {
+        ok("locked memory", locked.map_or("no limit".to_owned(), show::bytes))
+    } else {
+        warn(
+            "locked memory",
+            format!("limited to {}", locked.map_or(String::new(), show::bytes)),
+            "only where services lock their memory against swapping: `USER - memlock unlimited` in limits.conf",
+        )
+    });
+    findings
+}
+
+fn has_capability(number: u32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
+    effective
+        .and_then(|digits| u64::from_str_radix(digits.trim(), 16).ok())
+        .is_some_and(|set| set & (1 << number) != 0)
+}
+
+fn clocks() -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let source = std::fs::read_to_string("/sys/devices/system/clocksource/clocksource0/current_clocksource");
+    findings.push(match source.as_deref().map(str::trim) {
+        Ok(source @ ("tsc" | "kvm-clock" | "hyperv_clocksource_tsc_page" | "arch_sys_counter")) => {
+            ok("clock", source)
+        }
+        Ok(source) => warn(
+            "clock",
+            format!("{source}: each look at it is a system call"),
+            "boot with `tsc=reliable` if the processor's counter is sound (`dmesg | grep -i tsc`)",
+        ),
+        Err(_) => ok("clock", "monotonic"),
+    });
+    // Two looks at the clock in a row must not go back, and be less than a scheduler's tick apart more often than not.
+    let gaps: Vec<u128> = (0..100)
+        .map(|_| {
+            let first = clock::monotonic();
+            clock::monotonic().since(first).as_nanos()
+        })
+        .collect();
+    let median = {
+        let mut sorted = gaps;
+        sorted.sort_unstable();
+        sorted[sorted.len() / 2]
+    };
+    if median > 1000 {
+        findings.push(warn(
+            "clock's cost",
+            format!("{median} ns a look"),
+            "every message is stamped; a slow clock slows the board down",
+        ));
+    }
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let load = load.split(' ').next().and_then(|text| text.parse::<f64>().ok()).unwrap_or(0.0);
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    findings.push(if load > 2.0 * processors as f64 {
+        warn(
+            "load",
+            format!("{load} on {processors} processors"),
+            "services wait for their turn; end what else runs, or give the robot processors of its own (`cpu = [..]`)",
+        )
+    } else {
+        ok("load", format!("{load} on {processors} processors"))
+    });
+    findings
+}
+
+fn boards() -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for place in places() {
+        match living_launcher(&place) {
+            None => findings.push(warn(
+                &format!("board {}", place.name()),
+                "its launcher is gone, and its remains are still here",
+                "`board clean` ends its services and removes it",
+            )),
+            Some(pid) => findings.extend(board(&place, pid)),
+        }
+    }
+    let orphans = orphans();
+    findings.push(if orphans.is_empty() {
+        ok("leftovers", "no shared memory without a board")
+    } else {
+        warn(
+            "leftovers",
+            format!("{} files in /dev/shm belong to no board", orphans.len()),
+            "`board clean` removes them",
+        )
+    });
+    findings
+}
+
+fn board(place: &Place, launcher: u32) -> Vec<Finding> {
+    let check = format!("board {}", place.name());
+    let opened = Manifest::read(place).and_then(|manifest| {
+        let switchboard = Switchboard::open(&place.file("switchboard"))?;
+        Ok((manifest, switchboard))
+    });
+    let (manifest, switchboard) = match opened {
+        Ok(opened) => opened,
+        Err(error) => {
+            return vec![problem(&check, error.to_string(), "restart it: `launch stop` and `launch up`")];
+        }
+    };
+    let files = place.shared_memory();
+    let bytes: u64 =
+        files.iter().filter_map(|file| std::fs::metadata(file).ok()).map(|found| found.blocks() * 512).sum();
+    let mut findings = vec![ok(
+        &check,
+        format!(
+            "up (launcher {launcher}), {} topics, {} files with {} in shared memory",
+            manifest.topics.len(),
+            files.len(),
+            show::bytes(bytes)
+        ),
+    )];
+    let half_made = half_made(place);
+    if let Some(file) = half_made.first() {
+        findings.push(warn(
+            &check,
+            format!("{} files half made by a process that died, as {}", half_made.len(), name_of(file)),
+            "services may hang on them: `board clean`",
+        ));
+    }
+    let dead_tools = switchboard.dead_tools().count();
+    if dead_tools > 0 {
+        findings.push(warn(
+            &check,
+            format!("{dead_tools} tools were killed and still hold their ports"),
+            "topics take only so many readers: `board clean`",
+        ));
+    }
+    findings.extend(services(&check, &manifest, &switchboard));
+    findings
+}
+
+fn services(check: &str, manifest: &Manifest, switchboard: &Switchboard) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let now = clock::monotonic();
+    let lockstep = switchboard.header().lockstep.load(Ordering::Relaxed) != 0;
+    let mut seen = Vec::new();
+    for (_, slot) in switchboard.taken().filter(|(_, slot)| slot.is_service.load(Ordering::Relaxed) != 0) {
+        let (role, pid) = (slot.role(), slot.pid.load(Ordering::Relaxed));
+        let silent = now.since(slot.heartbeat());
+        let since = slot.step_since_ns.load(Ordering::Relaxed);
+        let in_step = if since == 0 { Duration::ZERO } else { now.since(Time::from_nanos(since)) };
+        let restart = format!("`launch restart {role}`");
+        match life(slot) {
+            Life::Dead => findings.push(problem(
+                check,
+                format!("`{role}` (process {pid}) is dead, and nobody has cleaned up after it"),
+                "its launcher should have; is it overloaded or stopped? `launch ps`",
+            )),
+            Life::Lives if in_step > SILENT => findings.push(problem(
+                check,
+                format!("`{role}` (process {pid}) has been in one step for {}", age(in_step)),
+                restart,
+            )),
+            // In lockstep a service sleeps until it is its turn.
+            Life::Lives if silent > SILENT && !lockstep => findings.push(problem(
+                check,
+                format!("`{role}` (process {pid}) has not looked about for {}", age(silent)),
+                format!("it is stopped, or starves: `ps -o stat,ni,pcpu {pid}`; {restart}"),
+            )),
+            Life::Idle if slot.state() == SlotState::Starting => {
+                findings.push(warn(
+                    check,
+                    format!("`{role}` (process {pid}) has not joined yet"),
+                    "`launch logs`",
+                ));
+            }
+            _ => {}
+        }
+        seen.push(role);
+    }
+    for missing in manifest.services.iter().filter(|name| !seen.contains(name)) {
+        findings.push(warn(check, format!("`{missing}` is not there"), format!("`launch logs {missing}`")));
+    }
+    if findings.is_empty() && !seen.is_empty() {
+        findings.push(ok(check, format!("{} services take steps", seen.len())));
+    }
+    findings
+}
+
+fn age(duration: Duration) -> String {
+    show::duration(duration.as_nanos() as f64)
+}
+
+fn name_of(file: &Path) -> String {
+    file.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,43 @@
+//! The board with real processes: typed services, deaths, wake-ups, and what is left behind.
+
+mod bells;
+mod chaos;
+mod ports;
+mod robot;
+mod runner;
+mod services;
+mod teardown;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match std::env::var(services::WHICH).as_deref() {
+        Ok("host") => teardown::host_process(),
+        Ok("tool") => teardown::tool_process(),
+        Ok("cleaner") => chaos::cleaner_process(),
+        Ok("bell") => bells::other_process(),
+        Ok(which) => services::serve(which),
+        Err(_) => runner::run(&[
+            ("a_late_reader_gets_the_last_message", ports::a_late_reader_gets_the_last_message),
+            ("every_message_wakes_the_reader", ports::every_message_wakes_the_reader),
+            ("a_queue_keeps_every_message", ports::a_queue_keeps_every_message),
+            ("a_queue_counts_what_overflow_swallows", ports::a_queue_counts_what_overflow_swallows),
+            ("another_layout_is_refused_by_the_field", ports::another_layout_is_refused_by_the_field),
+            ("a_second_publisher_is_refused", ports::a_second_publisher_is_refused),
+            (
+                "a_large_message_is_read_where_it_was_written",
+                ports::a_large_message_is_read_where_it_was_written,
+            ),
+            ("a_stamp_from_the_future_does_not_count", ports::a_stamp_from_the_future_does_not_count),
+            ("random_bytes_are_survived", ports::random_bytes_are_survived),
+            ("every_service_publishes_its_health", ports::every_service_publishes_its_health),
+            ("bells_wake_across_processes", bells::bells_wake_across_processes),
+            ("a_killed_host_is_swept_with_its_services", teardown::a_killed_host_is_swept_with_its_services),
+            (
+                "a_tools_place_is_taken_over_after_its_death",
+                teardown::a_tools_place_is_taken_over_after_its_death,
+            ),
+            ("deaths_during_start_up_break_nothing", chaos::deaths_during_start_up_break_nothing),
+        ]),
+    }
+}
