@@ -206,7 +206,7 @@ impl Codec {
     pub fn decode(&self, cdr: &[u8], raw: &mut Vec<u8>) -> Result<(), Misfit> {
         let misfit = Misfit { bytes: cdr.len() };
         let body = cdr.strip_prefix(&HEADER[..2]).and_then(|rest| rest.get(2..)).ok_or(misfit)?;
-        if body.len() < self.fixed.bytes {
+        if body.len() < self.fixed.bytes + usize::from(self.placeholder) {
             return Err(misfit);
         }
         let begin = raw.len();

@@ -20,6 +20,11 @@ pub use compare::{Difference, Digest, Digester, first_difference};
 pub use read::{Message, Messages, Recording};
 pub use write::{Counts, Recorder};
 
+/// The note that says when the recording began, in nanoseconds of the board's clock: older messages lay on the board already.
+pub const BEGIN_NOTE: &str = "begin_ns";
+/// The note that says how many messages were lost, as a JSON object by topic.
+pub const LOST_NOTE: &str = "lost";
+
 use messages::Description;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

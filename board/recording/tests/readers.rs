@@ -91,8 +91,7 @@ fn awkward() -> Vec<Description> {
 fn bytes(description: &Description, elements: usize, mut seed: u64) -> Vec<u8> {
     let length = match &description.element {
         Some(element) if element.size() > 0 => elements_offset(description.size) + elements * element.size(),
-        Some(_) => elements_offset(description.size),
-        None => description.size,
+        _ => description.size,
     };
     let next = move || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
