@@ -1,4 +1,5 @@
 //! `board record` and `board replay` with a board that is up.
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use board::host::Host;
 use board::manifest::{Manifest, Topic};
