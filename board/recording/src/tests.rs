@@ -192,7 +192,7 @@ fn a_recording_cut_anywhere_is_a_prefix() {
                 opened = true;
                 let found = read(recording.as_recorded(|_| true));
                 assert_eq!(found, messages[..found.len()]);
-                assert!(found.len() >= most && found.len() % 3 == 0);
+                assert!(found.len() >= most && found.len().is_multiple_of(3));
                 most = found.len();
             }
         }

@@ -52,10 +52,10 @@ mod tests {
             let mut derives = false;
             for line in text.lines() {
                 derives |= line.starts_with("#[derive(") && line.contains(" Message)");
-                if let Some(rest) = line.strip_prefix("pub struct ") {
-                    if std::mem::take(&mut derives) {
-                        names.push(rest.split(|c: char| !c.is_alphanumeric()).next().unwrap().to_owned());
-                    }
+                if let Some(rest) = line.strip_prefix("pub struct ")
+                    && std::mem::take(&mut derives)
+                {
+                    names.push(rest.split(|c: char| !c.is_alphanumeric()).next().unwrap().to_owned());
                 }
             }
         }
