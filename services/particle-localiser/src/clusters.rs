@@ -33,6 +33,8 @@ impl Cluster {
 pub(crate) struct Finder {
     table: BinTable,
     of_particle: Vec<u32>,
+    /// For each particle the place of its cluster in the list that was returned last.
+    pub(crate) ranks: Vec<u32>,
     mass: Vec<f64>,
     parent: Vec<u32>,
 }
@@ -131,19 +133,22 @@ impl Finder {
             }
         }
         let total: f64 = moments.iter().map(|sum| sum.weight).sum();
-        let whole = moments.iter().zip(&means).filter(|(sum, _)| sum.weight > 0.0);
-        let mut clusters: Vec<Cluster> = whole
-            .map(|(sum, pose)| {
-                let [xx, xy, xt, yy, yt, tt] = sum.second.map(|product| product / sum.weight);
-                Cluster {
-                    pose: *pose,
-                    covariance: [xx, xy, xt, xy, yy, yt, xt, yt, tt],
-                    share: sum.weight / total,
-                }
-            })
-            .collect();
-        clusters.sort_by(|a, b| b.share.total_cmp(&a.share));
-        clusters
+        // By bin; the order of equal shares is that of the bins.
+        let mut order: Vec<usize> = (0..bins).filter(|bin| moments[*bin].weight > 0.0).collect();
+        order.sort_by(|a, b| moments[*b].weight.total_cmp(&moments[*a].weight));
+        let mut rank_of = vec![u32::MAX; bins];
+        for (rank, bin) in (0_u32..).zip(&order) {
+            rank_of[*bin] = rank;
+        }
+        self.ranks.clear();
+        self.ranks.extend(self.of_particle.iter().map(|bin| rank_of[roots[*bin as usize] as usize]));
+        let whole = order.into_iter().map(|bin| (&moments[bin], means[bin]));
+        let cluster = |(sum, pose): (&Moments, Pose2)| {
+            let [xx, xy, xt, yy, yt, tt] = sum.second.map(|product| product / sum.weight);
+            let covariance = [xx, xy, xt, xy, yy, yt, xt, yt, tt];
+            Cluster { pose, covariance, share: sum.weight / total }
+        };
+        whole.map(cluster).collect()
     }
 }
 

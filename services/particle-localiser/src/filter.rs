@@ -10,7 +10,7 @@ use crate::clusters::{Cluster, Finder};
 use crate::motion::{MotionSigma, Travel, advance};
 use crate::params::{Params, Start};
 use crate::recovery::Averages;
-use crate::resample::{comb, resample};
+use crate::resample::{comb, resample_clusters};
 use crate::{Beams, Map, Particles, Weigher, kld};
 use geometry::Pose2;
 
@@ -83,6 +83,8 @@ impl Budget {
 const FEWEST: usize = 10;
 /// Candidates for each particle that is scattered to recover.
 const CANDIDATES: usize = 10;
+/// Weight of all scattered particles together, for each unit of their share.
+const SCATTERED_PRIOR: f64 = 0.01;
 /// From one pass to the next the spread shrinks to this.
 const SHRINK: f64 = 0.6;
 /// Directions at one place among scattered particles, which sets how far apart the places are.
@@ -172,7 +174,8 @@ impl Filter {
         }
         let bound = self.params.budget_particle_beams;
         let mut budget = Budget { left: (bound > 0).then_some(bound), limited: false };
-        if self.particles.is_empty() {
+        let from_nowhere = self.particles.is_empty();
+        if from_nowhere {
             let wanted = self.params.global_particles as usize;
             let count = budget.affordable(wanted, beams.len()).max(FEWEST);
             let (particles, spread) = self.scatter(count, true);
@@ -187,6 +190,9 @@ impl Filter {
         let passes = self.params.max_passes;
         let done = self.anneal(&mut particles, beams, &mut spread, passes, &mut budget);
         (self.particles, self.spread) = (particles, spread);
+        if from_nowhere {
+            self.level_clusters(beams);
+        }
         self.averages.add(done.fit, &self.params.recovery);
         let clusters = self.finder.find(&self.particles, self.division);
         let effective = self.particles.effective();
@@ -202,6 +208,35 @@ impl Filter {
             scattered,
             beams: beams.len(),
         })
+    }
+
+    /// After a search of the whole map: gives each cluster the weight of its best particle's likelihood. What a cluster has gathered until
+    /// then depends on how near to its peak one of the scattered particles lay, which is chance.
+    fn level_clusters(&mut self, beams: &Beams) {
+        let clusters = self.finder.find(&self.particles, self.division);
+        let mut best = vec![0_u32; clusters.len()];
+        self.weigher.weigh(&self.particles, beams, &mut self.points);
+        for (rank, points) in self.finder.ranks.iter().zip(&self.points) {
+            if let Some(best) = best.get_mut(*rank as usize) {
+                *best = (*best).max(*points);
+            }
+        }
+        let log = |points: u32| self.weigher.log_likelihood(points, beams.len());
+        let highest = log(best.iter().copied().max().unwrap_or(0));
+        let scale: Vec<f64> = clusters
+            .iter()
+            .zip(&best)
+            .map(|(cluster, points)| (log(*points) - highest).exp() / cluster.share.max(f64::MIN_POSITIVE))
+            .collect();
+        for (weight, rank) in self.particles.weight.iter_mut().zip(&self.finder.ranks) {
+            *weight *= scale.get(*rank as usize).copied().unwrap_or(0.0);
+        }
+        let total: f64 = self.particles.weight.iter().sum();
+        if total > 0.0 {
+            self.particles.weight.iter_mut().for_each(|weight| *weight /= total);
+        } else {
+            self.particles.level();
+        }
     }
 
     /// Draws the next generation when the particles have become too unequal or too many, with scattered ones among them when the scans
@@ -233,14 +268,21 @@ impl Filter {
         self.draw(count - scattered);
         self.epoch += 1;
         let particles = &mut self.particles;
+        let kept = particles.len();
         comb(&others.weight, scattered, self.seed, self.epoch, |index| particles.push(others.pose(index)));
-        particles.level();
+        // The scattered ones begin with little weight: they must fit much better to take over, not just as well.
+        let prior = SCATTERED_PRIOR * share;
+        let all = particles.len();
+        for (index, weight) in particles.weight.iter_mut().enumerate() {
+            *weight = if index < kept { *weight * (1.0 - prior) } else { prior / (all - kept) as f64 };
+        }
         scattered
     }
 
     fn draw(&mut self, count: usize) {
+        self.finder.find(&self.particles, self.division);
         self.epoch += 1;
-        resample(&self.particles, &mut self.spare, count, self.seed, self.epoch);
+        resample_clusters(&self.particles, &mut self.spare, &self.finder.ranks, count, self.seed, self.epoch);
         std::mem::swap(&mut self.particles, &mut self.spare);
         self.shake();
     }
@@ -318,8 +360,9 @@ impl Filter {
             if count < most {
                 break;
             }
+            self.finder.find(particles, self.division);
             self.epoch += 1;
-            resample(particles, &mut self.spare, count, self.seed, self.epoch);
+            resample_clusters(particles, &mut self.spare, &self.finder.ranks, count, self.seed, self.epoch);
             std::mem::swap(particles, &mut self.spare);
             self.epoch += 1;
             particles.jitter(self.seed, self.epoch, spread.place_m as f32, spread.heading_rad as f32);
