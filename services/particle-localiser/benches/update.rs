@@ -38,13 +38,18 @@ fn office() -> OccupancyGrid {
 
 fn scan(grid: &OccupancyGrid, pose: Pose2, beams: usize) -> (RangeScan, Vec<f32>) {
     let step = 1.5 * PI / beams as f64;
-    let header =
-        RangeScan { angle_min_rad: -0.75 * PI, angle_step_rad: step, range_max_m: 12.0, ..RangeScan::default() };
+    let header = RangeScan {
+        angle_min_rad: -0.75 * PI,
+        angle_step_rad: step,
+        range_max_m: 12.0,
+        ..RangeScan::default()
+    };
     let ranges = (0..beams).map(|index| {
         let direction = pose.heading_rad + header.angle_min_rad + index as f64 * step;
         // A repeatable scatter of about a centimetre.
         let scatter_m = 0.02 * ((index as f64 * 0.618).fract() - 0.5);
-        grid.cast_m(pose.position(), direction, 12.0, 65).map_or(99.0, |range_m| (range_m + 0.025 + scatter_m) as f32)
+        grid.cast_m(pose.position(), direction, 12.0, 65)
+            .map_or(99.0, |range_m| (range_m + 0.025 + scatter_m) as f32)
     });
     (header, ranges.collect())
 }
@@ -64,7 +69,10 @@ fn median_ms(rounds: usize, mut work: impl FnMut()) -> f64 {
 fn main() {
     let grid = office();
     let map = Map::of_grid(&grid, 65);
-    println!("{:<18} {:>9} {:>5} {:>10} {:>10} {:>8} {:>10} {:>10}", "model", "particles", "beams", "weigh ms", "update ms", "bar ms", "error m", "mrad");
+    println!(
+        "{:<18} {:>9} {:>5} {:>10} {:>10} {:>8} {:>10} {:>10}",
+        "model", "particles", "beams", "weigh ms", "update ms", "bar ms", "error m", "mrad"
+    );
     let cases = [
         (Model::LikelihoodField, 2000, 60, 0.2),
         (Model::LikelihoodField, 10_000, 180, 1.5),
@@ -92,11 +100,18 @@ fn main() {
         for (seed, pose) in (1..).zip(poses) {
             let (header, ranges) = scan(&grid, pose, beams);
             let beams = Beams::select(&header, &ranges, 12.0, beams);
-            let start = Start { x_m: pose.x_m, y_m: pose.y_m, heading_rad: pose.heading_rad, sigma_m: 0.1, sigma_rad: 0.05 };
+            let start = Start {
+                x_m: pose.x_m,
+                y_m: pose.y_m,
+                heading_rad: pose.heading_rad,
+                sigma_m: 0.1,
+                sigma_rad: 0.05,
+            };
             let begun = Filter::new(Params { start: Some(start), ..params.clone() }, map.clone(), seed);
             let particles: Particles = begun.particles().clone();
             let mut points = Vec::new();
-            weigh_ms += median_ms(51, || weigher.weigh(black_box(&particles), black_box(&beams), &mut points)) / 3.0;
+            weigh_ms +=
+                median_ms(51, || weigher.weigh(black_box(&particles), black_box(&beams), &mut points)) / 3.0;
             let mut filters = vec![begun; 31].into_iter();
             let mut last = None;
             update_ms += median_ms(31, || {

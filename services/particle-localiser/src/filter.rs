@@ -51,6 +51,8 @@ pub struct Filter {
     /// How far apart particles are that have been drawn more than once.
     spread: MotionSigma,
     averages: Averages,
+    /// Scans that are still to come in which the whole map is searched beside what has been found.
+    searches: u32,
     finder: Finder,
     bins: BinTable,
     points: Vec<u32>,
@@ -84,7 +86,7 @@ const FEWEST: usize = 10;
 /// Candidates for each particle that is scattered to recover.
 const CANDIDATES: usize = 10;
 /// Weight of all scattered particles together, for each unit of their share.
-const SCATTERED_PRIOR: f64 = 0.01;
+const SCATTERED_PRIOR: f64 = 0.001;
 /// From one pass to the next the spread shrinks to this.
 const SHRINK: f64 = 0.6;
 /// Directions at one place among scattered particles, which sets how far apart the places are.
@@ -107,6 +109,7 @@ impl Filter {
             spare: Particles::default(),
             spread: MotionSigma::default(),
             averages: Averages::default(),
+            searches: 0,
             finder: Finder::default(),
             bins: BinTable::default(),
             points: Vec::new(),
@@ -132,6 +135,11 @@ impl Filter {
         &self.weigher
     }
 
+    /// How well scans fit in the long run, 0 to 1.
+    pub fn usual_fit(&self) -> f64 {
+        self.averages.usual()
+    }
+
     /// How well the last scans fitted, 0 to 1.
     pub fn fit(&self) -> f64 {
         self.averages.fit()
@@ -154,6 +162,7 @@ impl Filter {
         }
         self.particles.level();
         self.particles.jitter(self.seed, self.epoch, start.sigma_m as f32, start.sigma_rad as f32);
+        self.searches = 0;
         self.spread = MotionSigma { place_m: 0.3 * start.sigma_m, heading_rad: 0.3 * start.sigma_rad };
         self.averages = Averages::default();
     }
@@ -192,6 +201,9 @@ impl Filter {
         (self.particles, self.spread) = (particles, spread);
         if from_nowhere {
             self.level_clusters(beams);
+            self.searches = self.params.recovery.early_scans;
+        } else {
+            self.searches = self.searches.saturating_sub(1);
         }
         self.averages.add(done.fit, &self.params.recovery);
         let clusters = self.finder.find(&self.particles, self.division);
@@ -244,7 +256,9 @@ impl Filter {
     fn renew(&mut self, beams: &Beams, effective: f64, wanted: usize, budget: &mut Budget) -> usize {
         let (fewest, most) = (self.params.min_particles as usize, self.params.max_particles as usize);
         let count = wanted.clamp(fewest, most);
-        let share = self.averages.scatter_share(&self.params.recovery);
+        let recovery = &self.params.recovery;
+        let early = if self.searches > 0 { 0.5 * recovery.most_scattered } else { 0.0 };
+        let share = self.averages.scatter_share(recovery).max(early);
         let scattered = (share * count as f64) as usize;
         let present = self.particles.len();
         let too_unequal = effective < self.params.resample_share * present as f64;

@@ -77,6 +77,9 @@ pub struct ParticleLocaliser {
 /// Below this part of the weight the best place is a guess among several.
 const DOUBTFUL_SHARE: f64 = 0.5;
 
+/// A scan that fits so much worse than usual is a sign that something is wrong.
+const DOUBTFUL_FIT: f64 = 0.7;
+
 impl ParticleLocaliser {
     /// A localiser on a map.
     ///
@@ -200,7 +203,8 @@ impl ParticleLocaliser {
             covariance[4] += sigma.place_m * sigma.place_m;
             covariance[8] += sigma.heading_rad * sigma.heading_rad;
         }
-        let doubtful = update.scattered > 0 || best.share < self.params.found_share;
+        let doubtful =
+            update.fit < DOUBTFUL_FIT * self.filter.usual_fit() || best.share < self.params.found_share;
         let state = match (self.is_found, doubtful) {
             (true, false) => LocationStateName::Tracking,
             (true, true) => LocationStateName::Degraded,

@@ -58,11 +58,11 @@ impl Default for MotionNoise {
     fn default() -> Self {
         Self {
             place_m: 0.02,
-            place_per_m: 0.06,
-            place_m_per_rad: 0.06,
+            place_per_m: 0.10,
+            place_m_per_rad: 0.10,
             heading_rad: 0.01,
-            heading_per_rad: 0.10,
-            heading_rad_per_m: 0.03,
+            heading_per_rad: 0.15,
+            heading_rad_per_m: 0.06,
         }
     }
 }
@@ -83,11 +83,14 @@ pub struct Recovery {
     /// No larger share of the particles is scattered at once; 0 turns recovery off.
     #[schemars(range(min = 0.0, max = 0.9))]
     pub most_scattered: f64,
+    /// For so many scans after a start without a pose the whole map is searched on, beside what has been found.
+    #[schemars(range(min = 0, max = 10000))]
+    pub early_scans: u32,
 }
 
 impl Default for Recovery {
     fn default() -> Self {
-        Self { slow_rate: 0.02, fast_rate: 0.3, tolerance: 0.1, most_scattered: 0.3 }
+        Self { slow_rate: 0.02, fast_rate: 0.3, tolerance: 0.1, most_scattered: 0.3, early_scans: 10 }
     }
 }
 
@@ -398,6 +401,7 @@ impl Parameters for Params {
             ("recovery.fast_rate", recovery.fast_rate, 0.001, 1.0),
             ("recovery.tolerance", recovery.tolerance, 0.0, 0.9),
             ("recovery.most_scattered", recovery.most_scattered, 0.0, 0.9),
+            ("recovery.early_scans", f64::from(recovery.early_scans), 0.0, 1e4),
             ("found_sigma_m", self.found_sigma_m, 0.001, 10.0),
             ("found_sigma_rad", self.found_sigma_rad, 0.001, 3.2),
             ("found_share", self.found_share, 0.1, 1.0),

@@ -33,6 +33,11 @@ impl Averages {
         drop.clamp(0.0, recovery.most_scattered)
     }
 
+    /// The slow average: how well scans fit in the long run.
+    pub fn usual(&self) -> f64 {
+        self.slow
+    }
+
     /// The fast average: how well the last scans fit.
     pub fn fit(&self) -> f64 {
         self.fast

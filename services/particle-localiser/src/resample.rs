@@ -71,7 +71,9 @@ pub(crate) fn resample_clusters(
         }
         weights.clear();
         let of_part = |rank: &u32| (*rank as usize).min(apart) == part;
-        weights.extend(ranks.iter().zip(&from.weight).map(|(rank, weight)| if of_part(rank) { *weight } else { 0.0 }));
+        weights.extend(
+            ranks.iter().zip(&from.weight).map(|(rank, weight)| if of_part(rank) { *weight } else { 0.0 }),
+        );
         comb(&weights, teeth, seed, epoch.wrapping_add((part as u64) << 48), |index| {
             into.push(from.pose(index));
             if let Some(weight) = into.weight.last_mut() {

@@ -36,7 +36,12 @@ pub fn scan_header(ranges: &[f32]) -> RangeScan {
         360 | 361 => PI / 360.0,
         _ => PI / 180.0,
     };
-    RangeScan { angle_min_rad: -FRAC_PI_2, angle_step_rad: step, range_max_m: RANGE_MAX_M, ..RangeScan::default() }
+    RangeScan {
+        angle_min_rad: -FRAC_PI_2,
+        angle_step_rad: step,
+        range_max_m: RANGE_MAX_M,
+        ..RangeScan::default()
+    }
 }
 
 pub fn load(name: &str) -> Option<Log> {
@@ -56,7 +61,8 @@ fn read_line(line: &str) -> Option<Entry> {
         "ODOM" => Some(Entry::Odometry(pose(1)?)),
         "FLASER" => {
             let count = number(1)? as usize;
-            let ranges = (2..2 + count).map(|index| number(index).map(|range| range as f32)).collect::<Option<_>>()?;
+            let ranges =
+                (2..2 + count).map(|index| number(index).map(|range| range as f32)).collect::<Option<_>>()?;
             Some(Entry::Scan { truth: pose(2 + count)?, ranges })
         }
         _ => None,
@@ -82,16 +88,22 @@ pub fn map_of_even_scans(entries: &[Entry]) -> OccupancyGrid {
     let reach_m = 20.0;
     let cells = |axis: usize| ((high[axis] - low[axis] + 2.0 * reach_m) / resolution_m) as u32;
     let frame =
-        GridFrame::new(cells(0), cells(1), resolution_m, Pose2::new(low[0] - reach_m, low[1] - reach_m, 0.0)).unwrap();
+        GridFrame::new(cells(0), cells(1), resolution_m, Pose2::new(low[0] - reach_m, low[1] - reach_m, 0.0))
+            .unwrap();
     let mut counts = Grid::filled(frame, [0_u32; 2]);
     for (truth, ranges) in even() {
         let header = scan_header(ranges);
         for index in 0..ranges.len() {
-            let Some((direction, range_m)) = header.beam(ranges, index).filter(|beam| beam.1 < reach_m) else { continue };
+            let Some((direction, range_m)) = header.beam(ranges, index).filter(|beam| beam.1 < reach_m)
+            else {
+                continue;
+            };
             let end = truth.transform(Point2::new(range_m * direction.cos(), range_m * direction.sin()));
             let end_cell = frame.cell_at(end);
             for cell in frame.cells_along(truth.position(), end) {
-                if Some(cell) != end_cell && let Some(count) = counts.get_mut(cell) {
+                if Some(cell) != end_cell
+                    && let Some(count) = counts.get_mut(cell)
+                {
                     count[0] += 1;
                 }
             }
@@ -151,7 +163,12 @@ pub fn run(log: &Log, mut params: Params, seed: u64, first: usize, most_m: f64, 
         let now = Time::from_nanos(stamp * 1_000_000);
         match entry {
             Entry::Odometry(pose) => {
-                let message = Odometry { x_m: pose.x_m, y_m: pose.y_m, heading_rad: pose.heading_rad, ..Odometry::default() };
+                let message = Odometry {
+                    x_m: pose.x_m,
+                    y_m: pose.y_m,
+                    heading_rad: pose.heading_rad,
+                    ..Odometry::default()
+                };
                 last_odometry = Some((now, message));
                 if let Some(localiser) = &mut localiser {
                     odometry = last_odometry;
