@@ -192,6 +192,7 @@ impl Filter {
         }
         let affordable = budget.affordable(self.particles.len(), beams.len()).max(FEWEST);
         if affordable < self.particles.len() {
+            self.finder.find(&self.particles, self.division);
             self.draw(affordable);
         }
         let mut particles = std::mem::take(&mut self.particles);
@@ -276,10 +277,9 @@ impl Filter {
             self.draw(count);
             return 0;
         }
-        self.epoch += 1;
+        self.draw(count - scattered);
         let (mut others, mut spread) = self.scatter(candidates, false);
         self.anneal(&mut others, beams, &mut spread, self.params.max_passes, budget);
-        self.draw(count - scattered);
         self.epoch += 1;
         let particles = &mut self.particles;
         let kept = particles.len();
@@ -293,8 +293,8 @@ impl Filter {
         scattered
     }
 
+    /// Draws the next generation from the clusters that were found last.
     fn draw(&mut self, count: usize) {
-        self.finder.find(&self.particles, self.division);
         self.epoch += 1;
         resample_clusters(&self.particles, &mut self.spare, &self.finder.ranks, count, self.seed, self.epoch);
         std::mem::swap(&mut self.particles, &mut self.spare);
