@@ -27,10 +27,9 @@ fn office() -> OccupancyGrid {
         let door_y = (x.rem_euclid(6.0) - 4.0).abs() < 0.5;
         let edge = x < 0.1 || y < 0.1 || x > SIDE_M - 0.1 || y > SIDE_M - 0.1;
         let pillar = (x.rem_euclid(7.3) - 3.1).hypot(y.rem_euclid(6.1) - 3.9) < 0.2;
-        if edge || on(x, 6.0) && !door_x || on(y, 5.0) && !door_y || pillar {
-            if let Some(value) = grid.get_mut(cell) {
-                *value = Occupancy::OCCUPIED;
-            }
+        let is_wall = edge || on(x, 6.0) && !door_x || on(y, 5.0) && !door_y || pillar;
+        if is_wall && let Some(value) = grid.get_mut(cell) {
+            *value = Occupancy::OCCUPIED;
         }
     }
     grid

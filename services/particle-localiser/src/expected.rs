@@ -128,7 +128,7 @@ fn meet(lines: &[Line], block: &Block, du: &Lanes, dv: &Lanes, ranges: &mut Lane
             let range = (wu * line.along[1] - wv * line.along[0]) * inverse;
             let share = (wu * dv[lane] - wv * du[lane]) * inverse;
             // A hair longer than the line is, so that no ray slips through a corner.
-            let met = (share >= -1e-5) & (share <= 1.000_01) & (range >= 0.0) & (range < ranges[lane]);
+            let met = ((share - 0.5).abs() <= 0.500_01) & (range >= 0.0) & (range < ranges[lane]);
             ranges[lane] = if met { range } else { ranges[lane] };
         }
     }

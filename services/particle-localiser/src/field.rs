@@ -3,6 +3,8 @@
 //! A likelihood field says of each cell how likely a beam ends there, in 255 steps: sums over beams are sums of whole numbers, exact in
 //! any order, and four to eight times as much of the map lies in the cache as with single precision.
 
+#![allow(clippy::needless_range_loop, reason = "one lane of several arrays at a time")]
+
 use crate::trigonometry::sin_cos;
 use geometry::Grid;
 

@@ -62,9 +62,9 @@ pub(crate) fn resample_clusters(
     let rest: f64 = mass[apart..].iter().sum();
     into.clear();
     let mut weights = Vec::with_capacity(from.len());
-    for part in 0..=apart {
-        let share = if part < apart { mass[part] } else { rest } / total;
-        let least = if part < apart { FLOOR } else { 0.0 };
+    let parts = mass[..apart].iter().map(|mass| (*mass, FLOOR)).chain([(rest, 0.0)]);
+    for (part, (mass, least)) in parts.enumerate() {
+        let share = mass / total;
         let teeth = (share.max(least) * count as f64).round() as usize;
         if teeth == 0 {
             continue;

@@ -1,5 +1,7 @@
 //! The ultrasonic robot in the three arenas: found from one to three scans without a pose.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
+
 mod support;
 
 use geometry::{Point2, Polygon, Pose2, Walls, angle};

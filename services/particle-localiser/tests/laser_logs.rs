@@ -1,5 +1,7 @@
 //! Recorded laser drives: maps of the even scans, localised on the odd ones from raw odometry.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
+
 mod support;
 
 use particle_localiser::Params;

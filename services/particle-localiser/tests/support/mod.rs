@@ -1,5 +1,11 @@
 //! Recorded drives for the tests: a minimal reader of CARMEN logs, a map of their even scans, and a run over the odd ones.
-#![allow(dead_code, missing_docs, unreachable_pub)]
+#![allow(
+    dead_code,
+    missing_docs,
+    unreachable_pub,
+    clippy::unwrap_used,
+    reason = "each test uses a part of it"
+)]
 
 use flate2::read::GzDecoder;
 use geometry::{Grid, GridFrame, Occupancy, OccupancyGrid, Point2, Pose2, angle};
