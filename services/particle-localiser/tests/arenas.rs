@@ -40,6 +40,8 @@ fn params() -> Params {
         update_turn_rad: 0.0,
         found_sigma_m: 0.02,
         found_sigma_rad: 3.0_f64.to_radians(),
+        // Places that are alike are told apart by evidence, not by the luck of a scan.
+        found_share: 0.95,
         ..Params::default()
     }
 }
@@ -186,6 +188,12 @@ fn a_hundred_starts() {
     for arena in &arenas[..2] {
         assert!(tally(arena, 100, 3).right >= 99);
     }
+}
+
+#[test]
+#[ignore = "a minute; how often moving resolves what repeats itself"]
+fn moving_resolves_the_third_arena() {
+    let Some(arenas) = arenas() else { return };
     let third = tally(&arenas[2], 30, 12);
-    assert!(third.ambiguous >= 15 && third.wrong <= 2, "{third:?}");
+    assert!(third.ambiguous >= 15 && third.right >= 15 && third.wrong <= 2, "{third:?}");
 }
