@@ -234,6 +234,7 @@ impl RawPublisher {
 
 impl RawReader {
     /// The next message that waits.
+    #[inline(always)]
     pub(crate) fn receive(&self) -> Option<RawMessage> {
         // A connection to a publisher that died in mid-creation cannot be opened; the others go on.
         self.subscriber.receive().ok().flatten().map(|sample| RawMessage { sample })

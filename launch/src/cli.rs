@@ -51,6 +51,28 @@ pub(crate) enum Command {
     Graph(GraphArgs),
     /// Order a coffee to a room
     Order(OrderArgs),
+    /// Hash a recording: equal for equal runs
+    Digest {
+        /// The recording
+        #[arg(value_name = "FILE.mcap", value_hint = clap::ValueHint::FilePath)]
+        file: PathBuf,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Show where two recorded runs first differ: topic, logical time, field and both values
+    #[command(after_help = "Exit code: 0 the runs are the same, 1 they differ.")]
+    Diff {
+        /// One recording
+        #[arg(value_name = "A.mcap", value_hint = clap::ValueHint::FilePath)]
+        a: PathBuf,
+        /// The other
+        #[arg(value_name = "B.mcap", value_hint = clap::ValueHint::FilePath)]
+        b: PathBuf,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
     /// Print completions for a shell
     #[command(
         after_help = "Example:\n  launch completions bash > ~/.local/share/bash-completion/completions/launch"
@@ -165,6 +187,9 @@ pub(crate) struct UpArgs {
     /// In lockstep: the processor for the whole graph
     #[arg(long, value_name = "N", requires = "lockstep")]
     pub(crate) cpu: Option<usize>,
+    /// In lockstep: record every message into this file (MCAP)
+    #[arg(long, value_name = "FILE.mcap", requires = "lockstep", value_hint = clap::ValueHint::FilePath)]
+    pub(crate) record: Option<PathBuf>,
     /// Print the referee's figures as JSON at the end
     #[arg(long)]
     pub(crate) json: bool,
