@@ -78,8 +78,7 @@ impl Shared {
     pub(crate) fn note_origin(&self, origin: Time) {
         let oldest = self.origin.get().map_or(origin, |oldest| oldest.min(origin));
         self.origin.set(Some(oldest));
-        let age = self.now.get().since(oldest).as_nanos();
-        self.oldest_input_ns.set(u64::try_from(age).unwrap_or(u64::MAX));
+        self.oldest_input_ns.set(self.now.get().as_nanos().saturating_sub(oldest.as_nanos()));
     }
 
     /// The origin of what is published now: that of the oldest input, or this moment for a sensor.
