@@ -23,7 +23,9 @@ pub(crate) fn diff(a: &Path, b: &Path, as_json: bool) -> Result<ExitCode, String
     let open = |file: &Path| Recording::open(file).map_err(|error| error.to_string());
     let difference = first_difference(&open(a)?, &open(b)?).map_err(|error| error.to_string())?;
     match (&difference, as_json) {
-        (difference, true) => println!("{}", serde_json::json!({"same": difference.is_none(), "difference": difference})),
+        (difference, true) => {
+            println!("{}", serde_json::json!({"same": difference.is_none(), "difference": difference}))
+        }
         (None, false) => println!("the runs are the same"),
         (Some(difference), false) => println!("{difference}"),
     }

@@ -59,7 +59,12 @@ fn up_command(args: &UpArgs) -> ExitCode {
     let options = up::Options { board: args.board.clone(), logs: args.log_dir.clone(), json: args.json };
     let mut lines = plain::Lines::new(args.no_view);
     if args.lockstep {
-        let pace = lockstep::Pace { speed: args.speed, until_s: args.until, cpu: args.cpu, record: args.record.clone() };
+        let pace = lockstep::Pace {
+            speed: args.speed,
+            until_s: args.until,
+            cpu: args.cpu,
+            record: args.record.clone(),
+        };
         return lockstep::up(&graph, &options, &pace, &mut lines);
     }
     let on_terminal = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();

@@ -69,7 +69,8 @@ impl Observer {
                     recorder.record(index, &envelope, bytes)?;
                 }
                 if self.finish.as_ref() == Some(&watched.topic) {
-                    self.summary = View::<RunSummary>::parse(bytes).ok().map(|view| *view.message).or(self.summary);
+                    self.summary =
+                        View::<RunSummary>::parse(bytes).ok().map(|view| *view.message).or(self.summary);
                 }
             }
         }

@@ -108,8 +108,8 @@ impl Running {
     /// Publishes bytes, whatever they are, in the name of whoever publishes the topic.
     pub fn publish_bytes(&self, topic: &str, bytes: &[u8]) {
         self.with_tap(|tap| {
-            let publisher = tap.publisher(topic).unwrap_or_else(|error| panic!("{error}"));
-            publisher.publish(bytes).unwrap_or_else(|error| panic!("{error}"));
+            let publisher = tap.publisher(topic).unwrap_or_else(|error| panic!("{error}\n{}", self.output()));
+            publisher.publish(bytes).unwrap_or_else(|error| panic!("{error}\n{}", self.output()));
         });
     }
 

@@ -16,8 +16,16 @@ fn check_delivery(room: &str, seed: u64) {
 #[test]
 fn ten_rooms_and_seeds() {
     for (room, seed) in [
-        ("201", 101), ("202", 102), ("203", 103), ("204", 104), ("206", 105), ("208", 106), ("210", 107), ("213", 108),
-        ("302", 109), ("309", 110),
+        ("201", 101),
+        ("202", 102),
+        ("203", 103),
+        ("204", 104),
+        ("206", 105),
+        ("208", 106),
+        ("210", 107),
+        ("213", 108),
+        ("302", 109),
+        ("309", 110),
     ] {
         check_delivery(room, seed);
     }
@@ -55,7 +63,9 @@ fn a_recording_has_the_digest_of_its_run_and_a_difference_is_named() {
     let printed = std::process::Command::new(tests::launcher()).arg("digest").arg(&a).output().unwrap();
     assert!(String::from_utf8_lossy(&printed.stdout).starts_with(digest(&run)), "{printed:?}");
     let (_, same) = record("same.mcap", None);
-    let diff = |other| std::process::Command::new(tests::launcher()).arg("diff").arg(&a).arg(other).output().unwrap();
+    let diff = |other| {
+        std::process::Command::new(tests::launcher()).arg("diff").arg(&a).arg(other).output().unwrap()
+    };
     assert!(diff(&same).status.success());
     let (_, other) = record("other.mcap", Some(("tag-driver.sigma_m", 0.2)));
     let printed = diff(&other);

@@ -14,7 +14,9 @@ const BASE_PERIOD: Duration = Duration::from_millis(20);
 fn wait_until_driving(graph: &Running) {
     graph.wait_for(
         "wheels/applied",
-        |applied| applied["left_mps"].as_f64().unwrap_or(0.0) + applied["right_mps"].as_f64().unwrap_or(0.0) > 0.2,
+        |applied| {
+            applied["left_mps"].as_f64().unwrap_or(0.0) + applied["right_mps"].as_f64().unwrap_or(0.0) > 0.2
+        },
         Duration::from_secs(60),
     );
 }
@@ -23,8 +25,17 @@ fn wait_until_driving(graph: &Running) {
 fn each_service_may_die_once_and_the_coffee_arrives() {
     let graph = Graph::load("coffee").set("referee.time_limit_s", 300.0).start();
     for role in [
-        "collision-avoidance", "controller", "base-driver", "navigator", "planner", "localiser", "tof-driver",
-        "tag-driver", "angle-correction", "door-locator", "current-state",
+        "collision-avoidance",
+        "controller",
+        "base-driver",
+        "navigator",
+        "planner",
+        "localiser",
+        "tof-driver",
+        "tag-driver",
+        "angle-correction",
+        "door-locator",
+        "current-state",
     ] {
         wait_until_driving(&graph);
         let mut applied = graph.reader("wheels/applied");
@@ -40,7 +51,8 @@ fn each_service_may_die_once_and_the_coffee_arrives() {
             clock::sleep(Duration::from_millis(2));
         }
     }
-    let summary = graph.wait_for("run/summary", |summary| summary["state"] != "Running", Duration::from_secs(300));
+    let summary =
+        graph.wait_for("run/summary", |summary| summary["state"] != "Running", Duration::from_secs(300));
     assert_eq!(summary["state"], "Passed", "{summary:#}\n{}", graph.output());
 }
 
@@ -85,8 +97,8 @@ fn a_service_that_is_stopped_counts_as_hanging_and_is_started_anew() {
     assert!(graph.output().contains("planner: hangs"), "{}", graph.output());
 }
 
-/// Who forges these decides that the run is over: the referee believes the truth, and the launcher believes the referee.
-const ENDS_THE_RUN: [&str; 2] = ["world/truth", "run/summary"];
+/// Who forges these decides that the run is over: the referee believes the truth and the mission, and the launcher the referee.
+const ENDS_THE_RUN: [&str; 3] = ["mission/status", "world/truth", "run/summary"];
 
 #[test]
 fn bad_messages_on_every_topic_crash_nobody() {

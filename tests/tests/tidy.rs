@@ -155,8 +155,17 @@ fn every_crate_obeys_the_one_lint_table() {
     let root = root();
     let mut crates = folders(&root.join("services"));
     crates.extend(
-        ["board", "board/recording", "board/tool", "launch", "tests", "schemas/geometry", "schemas/messages", "schemas/messages/derive"]
-            .map(|name| root.join(name)),
+        [
+            "board",
+            "board/recording",
+            "board/tool",
+            "launch",
+            "tests",
+            "schemas/geometry",
+            "schemas/messages",
+            "schemas/messages/derive",
+        ]
+        .map(|name| root.join(name)),
     );
     for folder in crates {
         let workspace = manifest(&folder)
