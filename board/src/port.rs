@@ -31,10 +31,20 @@ impl ReaderLink {
     #[inline(never)]
     fn newest(&mut self, held: &mut Option<RawMessage>, valid: fn(&[u8]) -> bool) {
         while let Some(message) = self.next() {
+            let sequence = message.envelope().sequence;
             if valid(message.bytes()) {
                 *held = Some(message);
             } else {
                 self.shared.invalid.set(self.shared.invalid.get() + 1);
+            }
+            // The count says whether another one waits; asking the transport costs as much as a message.
+            let count = self
+                .shared
+                .switchboard
+                .topic(self.topic)
+                .map_or(u64::MAX, |entry| entry.count.load(Ordering::Acquire));
+            if sequence >= count {
+                break;
             }
         }
     }

@@ -160,6 +160,17 @@ impl Running {
         pid
     }
 
+    /// Every service with its process.
+    pub fn services(&self) -> Vec<(String, u32)> {
+        let roles = self.with_tap(|tap| tap.manifest().services.clone());
+        roles.into_iter().map(|role| (role.clone(), self.pid(&role))).collect()
+    }
+
+    /// The launcher's process.
+    pub fn launcher_pid(&self) -> u32 {
+        self.launcher.borrow().id()
+    }
+
     /// Kills a service (signal 9) and returns the moment.
     pub fn kill(&self, role: &str) -> messages::Time {
         signal(self.pid(role), "KILL");

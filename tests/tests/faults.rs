@@ -107,7 +107,7 @@ fn bad_messages_on_every_topic_crash_nobody() {
     let topics = board::manifest::Manifest::read(graph.place()).unwrap().topics;
     let (last, first): (Vec<_>, Vec<_>) =
         topics.iter().partition(|topic| ENDS_THE_RUN.contains(&topic.name.as_str()));
-    let before: Vec<(String, u32)> = services(&graph);
+    let before: Vec<(String, u32)> = graph.services();
     let mut random = Random(0x5eed);
     for round in 0..30 {
         for topic in &first {
@@ -120,7 +120,7 @@ fn bad_messages_on_every_topic_crash_nobody() {
     if let Some(applied) = Running::newest::<AppliedWheels>(&mut applied) {
         assert!(applied.left_mps.abs() <= 0.5 && applied.right_mps.abs() <= 0.5, "{applied:?}");
     }
-    assert_eq!(services(&graph), before, "a service died of bad messages:\n{}", graph.output());
+    assert_eq!(graph.services(), before, "a service died of bad messages:\n{}", graph.output());
     for topic in &last {
         graph.publish_bytes(&topic.name, &random.message(topic.message.size, 0));
         clock::sleep(Duration::from_millis(100));
@@ -154,10 +154,4 @@ impl Random {
         };
         (0..length.div_ceil(8)).flat_map(|_| word(self).to_le_bytes()).take(length).collect()
     }
-}
-
-/// Every service with its process.
-fn services(graph: &Running) -> Vec<(String, u32)> {
-    let roles = board::manifest::Manifest::read(graph.place()).unwrap().services;
-    roles.into_iter().map(|role| (role.clone(), graph.pid(&role))).collect()
 }
