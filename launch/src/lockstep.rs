@@ -57,7 +57,7 @@ pub(crate) fn run(
     let board = options.board.as_deref().unwrap_or(&graph.name);
     let mut graph = graph.clone();
     // Turns are handed around thousands of times a second. On one processor that costs a switch; across two, an interrupt.
-    let cpu = pace.cpu.unwrap_or_else(|| last_processor());
+    let cpu = pace.cpu.unwrap_or_else(last_processor);
     for service in graph.services.iter_mut().filter(|service| service.launch.cpu.is_empty()) {
         service.launch.cpu = vec![cpu];
     }

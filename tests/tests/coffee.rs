@@ -1,5 +1,7 @@
 //! Coffee is delivered: by all processes, in logical time.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
+
 use serde_json::Value;
 use tests::Graph;
 

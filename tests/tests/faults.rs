@@ -1,5 +1,7 @@
 //! Kill any service while the robot drives: the wheels stand unless GO and command are fresh, the service comes back, the coffee arrives.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
+
 use board::clock;
 use messages::{AppliedWheels, Time};
 use std::time::Duration;

@@ -1,5 +1,7 @@
 //! Nothing of a board stays behind, however it ends.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
+
 use board::clock;
 use board::place::Place;
 use std::process::Command;
