@@ -9,6 +9,7 @@ mod controllers;
 mod course;
 pub mod fuzzy;
 mod params;
+mod surround;
 #[cfg(test)]
 mod tests;
 
@@ -21,11 +22,12 @@ use controllers::Wheels;
 use course::Course;
 use geometry::{Pose2, angle};
 use messages::{
-    DriveCommand, DriveModeName, Parameters, Path, PlanStateName, PoseEstimate, RangeScan, Stamped, Time,
-    TofRanges, WheelSpeeds,
+    DriveCommand, DriveModeName, Odometry, Parameters, Path, PlanStateName, PoseEstimate, RangeScan, Stamped,
+    Time, TofRanges, WheelSpeeds,
 };
 use std::f64::consts::PI;
 use std::time::Duration;
+use surround::Surround;
 
 /// In the rule files avoidance takes over at this clearance; clearances are scaled to it.
 const RULES_TRIGGER_M: f64 = 0.5;
@@ -49,6 +51,8 @@ pub struct Inputs<'a> {
     pub ranges: Option<Stamped<'a, TofRanges>>,
     /// A laser's scan.
     pub scan: Option<Stamped<'a, RangeScan>>,
+    /// The way by the wheels: what was seen a moment ago is remembered in its frame.
+    pub odometry: Option<Stamped<'a, Odometry>>,
 }
 
 /// Who decided.
@@ -129,6 +133,7 @@ pub struct FuzzyController {
     controllers: Controllers,
     course: Course,
     tof: TofMemory,
+    surround: Surround,
     rotating: bool,
     last_error_rad: f64,
     wheels: Wheels,
@@ -148,6 +153,7 @@ impl FuzzyController {
             params,
             course: Course::default(),
             tof: TofMemory::default(),
+            surround: Surround::default(),
             rotating: false,
             last_error_rad: 0.0,
             wheels: [0.0; 2],
@@ -176,7 +182,12 @@ impl FuzzyController {
         let sound = wanted.wheels.iter().all(|speed| speed.is_finite());
         let wanted = if sound { wanted } else { Decision::stand(Behaviour::BadInput) };
 
+        let here = inputs.odometry.and_then(|way| way.fresh(now, max_age)).and_then(|way| way.pose().ok());
+        let ranges = inputs.ranges.map(|ranges| (ranges.stamp, ranges.message));
+        self.surround.observe(now, here, ranges, &self.params);
+
         let slow_enough = limited(wanted.wheels, wanted.speed_limit_mps.min(self.params.top_speed_mps));
+        let slow_enough = self.surround.allowed(slow_enough, &self.params);
         let change_mps =
             if wanted.at_once { f64::INFINITY } else { self.params.acceleration_mps2 * elapsed_s };
         self.wheels = eased(self.wheels, slow_enough, change_mps);
@@ -262,8 +273,13 @@ impl FuzzyController {
             self.rotating = false;
             if self.moves_forward() {
                 (Behaviour::Brake, [0.0; 2])
-            } else {
+            } else if !self.params.turns_by_path {
                 (Behaviour::Avoidance, self.turn_away(clearances))
+            } else if error_rad.abs() > self.params.rotation_begin_rad {
+                // The planner knows of the obstacle too, and its new path leads around it.
+                (Behaviour::Avoidance, self.rotate(error_rad))
+            } else {
+                (Behaviour::Brake, [0.0; 2])
             }
         } else if self.is_near(clearances) && aim.goal_m >= self.params.goal_without_avoidance_m {
             self.rotating = false;
@@ -275,6 +291,7 @@ impl FuzzyController {
             (Behaviour::Motion, self.scaled(wheels))
         };
         let at_once = behaviour == Behaviour::Brake;
+        let wheels = limited(wheels, self.speed_before_mps(clearances.front_m));
         Decision { behaviour, wheels, at_once, speed_limit_mps: 0.0, error_rad, distance_m: aim.way_m }
     }
 
@@ -305,6 +322,14 @@ impl FuzzyController {
         let steady = if flipped { error_rad + 2.0 * PI * self.last_error_rad.signum() } else { error_rad };
         self.last_error_rad = steady;
         steady
+    }
+
+    /// The speed from which the robot stops before it must brake (companions 2.5), and never less than a creep.
+    fn speed_before_mps(&self, front_m: f64) -> f64 {
+        let room_m = (front_m - self.params.brake_distance_m).max(0.0);
+        let (brake, latency) = (self.params.brake_mps2, self.params.latency_s);
+        let lost = brake * latency;
+        ((lost * lost + 2.0 * brake * room_m).sqrt() - lost).max(self.params.creep_speed_mps)
     }
 
     fn moves_forward(&self) -> bool {

@@ -1,6 +1,6 @@
 //! The process around `fuzzy_controller`.
 use fuzzy_controller::{FuzzyController, Inputs, Params, RangeSource};
-use messages::{DriveCommand, Path, PoseEstimate, RangeScan, TofRanges, WheelSpeeds};
+use messages::{DriveCommand, Odometry, Path, PoseEstimate, RangeScan, TofRanges, WheelSpeeds};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -17,6 +17,7 @@ fn main() -> ExitCode {
             RangeSource::Both => (node.latest("tof/ranges")?, node.latest("laser/scan")?),
             RangeSource::None => (node.optional("tof/ranges")?, node.optional("laser/scan")?),
         };
+        let mut odometry = node.optional::<Odometry>("wheels/odometry")?;
         let mut wheels = node.publisher::<WheelSpeeds>("wheels/desired")?;
         node.every(params.period());
         let mut controller = FuzzyController::new(params)?;
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
                     pose: pose.read(),
                     ranges: ranges.read(),
                     scan: scan.read(),
+                    odometry: odometry.read(),
                 },
             );
             if outputs.blocked && !blocked {

@@ -86,6 +86,18 @@ pub struct Params {
     /// Below this clearance in front the robot brakes at once, and then only turns.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub brake_distance_m: f64,
+    /// In front of an obstacle the robot turns to its path, which will lead around it, instead of away by the rules; without such a
+    /// path it waits.
+    pub turns_by_path: bool,
+    /// No motion brings the hull nearer than this to what the time-of-flight sensors saw a moment ago; 0 does not look.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub keep_away_m: f64,
+    /// Deceleration of the drive, for the speed ahead of obstacles (companions 2.5).
+    #[schemars(range(min = 0.01, max = 20.0))]
+    pub brake_mps2: f64,
+    /// Time from a reading to the wheels.
+    #[schemars(range(min = 0.0, max = 5.0))]
+    pub latency_s: f64,
     /// By how much clearances beside the laser cones, from 50 to 110 degrees, are stretched.
     #[schemars(range(min = 1.0, max = 10.0))]
     pub lateral_factor: f64,
@@ -139,6 +151,10 @@ impl Default for Params {
             front_trigger_m: 0.5,
             side_trigger_m: 0.5,
             brake_distance_m: 0.2,
+            turns_by_path: false,
+            keep_away_m: 0.0,
+            brake_mps2: 0.5,
+            latency_s: 0.2,
             lateral_factor: 1.5,
             goal_without_avoidance_m: 0.3,
             blocked_after_ms: 8000,
@@ -215,6 +231,9 @@ impl Parameters for Params {
             ("front_trigger_m", self.front_trigger_m, 0.01, 10.0),
             ("side_trigger_m", self.side_trigger_m, 0.01, 10.0),
             ("brake_distance_m", self.brake_distance_m, 0.0, 10.0),
+            ("keep_away_m", self.keep_away_m, 0.0, 1.0),
+            ("brake_mps2", self.brake_mps2, 0.01, 20.0),
+            ("latency_s", self.latency_s, 0.0, 5.0),
             ("lateral_factor", self.lateral_factor, 1.0, 10.0),
             ("goal_without_avoidance_m", self.goal_without_avoidance_m, 0.0, 10.0),
             ("blocked_after_ms", self.blocked_after_ms as f64, 100.0, 3_600_000.0),

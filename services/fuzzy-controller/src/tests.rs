@@ -101,6 +101,7 @@ impl World {
             pose: Some(Stamped::new(self.now, &pose)),
             ranges: None,
             scan: Some(Stamped::with_elements(self.now, &header, &beams)),
+            odometry: None,
         };
         let outputs = self.controller.step(self.now, &inputs);
         let WheelSpeeds { left_mps, right_mps } = outputs.wheels;
@@ -222,6 +223,7 @@ fn decide(
         pose: Some(Stamped::new(now, &pose)),
         ranges: Some(Stamped::new(now, &tof)),
         scan: None,
+        odometry: None,
     };
     controller.step(now, &inputs)
 }
@@ -304,6 +306,7 @@ fn check_stale(pose_age_ms: u64, tof_age_ms: u64, command_age_ms: u64, expected:
         pose: Some(Stamped::new(ago(pose_age_ms), &pose)),
         ranges: Some(Stamped::new(ago(tof_age_ms), &tof)),
         scan: None,
+        odometry: None,
     };
     assert_eq!(controller.step(ago(0), &inputs).behaviour, expected);
     assert_eq!(controller.step(ago(0), &Inputs::default()).wheels, WheelSpeeds::ZERO);
@@ -333,6 +336,7 @@ fn braking_is_at_once_and_then_the_robot_only_turns() {
             pose: Some(Stamped::new(now, &pose)),
             ranges: Some(Stamped::new(now, &tof)),
             scan: None,
+            odometry: None,
         };
         controller.step(now, &inputs)
     };
@@ -397,6 +401,7 @@ fn a_coffee_robot_follows_a_hallway_along_its_wall() {
             pose: Some(Stamped::new(now, &here)),
             ranges: Some(Stamped::new(now, &tof)),
             scan: None,
+            odometry: None,
         };
         let outputs = controller.step(now, &inputs);
         if outputs.behaviour == Behaviour::Reached {

@@ -39,8 +39,8 @@ pub struct Field {
     inflated: Vec<bool>,
     /// How many observed obstacles are too near.
     taken: Vec<u16>,
-    /// How many observed obstacles are near enough to cost.
-    near: Vec<u16>,
+    /// How many observed obstacles are near enough to cost, and how many are nearer than half of that.
+    near: [Vec<u16>; 2],
     /// Which of the eight moves are open in each cell.
     moves: Vec<u8>,
     /// What steps into a cell cost in addition, by direction, in sixteenths; empty without costs.
@@ -48,7 +48,7 @@ pub struct Field {
     walls_extra: Vec<[u8; 8]>,
     /// Cells around an observed obstacle that are taken, and those beyond that are near.
     taken_disc: Vec<(i32, i32)>,
-    near_disc: Vec<(i32, i32)>,
+    near_discs: [Vec<(i32, i32)>; 2],
 }
 
 impl Field {
@@ -64,11 +64,12 @@ impl Field {
         let taken_m = costs.robot_radius_m + costs.obstacle_margin_m;
         let near_m = taken_m.max(costs.clearance_m) + grid.resolution_m();
         let taken_disc = disc(0.0, taken_m, grid.resolution_m());
-        let near_disc = disc(taken_m, near_m, grid.resolution_m());
+        let middle_m = 0.5 * (taken_m + near_m);
+        let near_discs = [middle_m, near_m].map(|to_m| disc(taken_m, to_m, grid.resolution_m()));
         let mut field = Self {
             moves: vec![0; grid.len()],
             taken: vec![0; grid.len()],
-            near: vec![0; grid.len()],
+            near: [vec![0; grid.len()], vec![0; grid.len()]],
             extra: walls_extra.clone(),
             robot_radius_m: costs.robot_radius_m,
             clearance_weight: costs.clearance_weight,
@@ -78,7 +79,7 @@ impl Field {
             inflated,
             walls_extra,
             taken_disc,
-            near_disc,
+            near_discs,
         };
         for row in 0..field.grid.height() as i64 {
             field.update_moves(row, 0, field.grid.width() as i64 - 1);
@@ -176,11 +177,13 @@ impl Field {
                 count(&mut self.taken[other], present);
             }
         }
-        for at in 0..self.near_disc.len() {
-            let (dx, dy) = self.near_disc[at];
-            if let Some(other) = self.grid.checked_index(column + i64::from(dx), row + i64::from(dy)) {
-                count(&mut self.near[other], present);
-                self.update_extra(other);
+        for ring in 0..self.near_discs.len() {
+            for at in 0..self.near_discs[ring].len() {
+                let (dx, dy) = self.near_discs[ring][at];
+                if let Some(other) = self.grid.checked_index(column + i64::from(dx), row + i64::from(dy)) {
+                    count(&mut self.near[ring][other], present);
+                    self.update_extra(other);
+                }
             }
         }
         for other_row in row - reach - 1..=row + reach + 1 {
@@ -215,7 +218,8 @@ impl Field {
         if !self.has_costs {
             return;
         }
-        let beside = if self.near[cell] > 0 { self.clearance_weight as f32 * 0.5 * SIXTEENTHS } else { 0.0 };
+        let rings = self.near.iter().filter(|ring| ring[cell] > 0).count();
+        let beside = self.clearance_weight as f32 * 0.5 * rings as f32 * SIXTEENTHS;
         self.extra[cell] = self.walls_extra[cell].map(|walls| walls.saturating_add(beside as u8));
     }
 }

@@ -6,8 +6,14 @@ use geometry::{Point2, Pose2};
 use messages::{Reading, TOF_COUNT, Time, TofRanges};
 use std::time::Duration;
 
-/// Sightings that count at most, so that an obstacle that leaves is forgotten soon.
-const HITS_MAX: u8 = 5;
+/// A sighting counts for so many readings that pass: thin things are seen only now and then (COF-123).
+const SIGHTING: u8 = 3;
+/// What counts at most, so that an obstacle that leaves is forgotten soon.
+const WEIGHT_MAX: u8 = 5 * SIGHTING;
+/// What lies in the outer part of a cone fills too little of it to be seen for sure: a reading frees only this share of its width.
+const SURE_SHARE: f64 = 0.6;
+/// The robot's body (COF-003), less the error of its pose: where it stands there is no obstacle.
+const BODY_M: [f64; 2] = [0.305 - 0.05, 0.255 - 0.05];
 /// As many obstacles are remembered; a ninth of a hallway's floor.
 const MARKS_MAX: usize = 4000;
 
@@ -30,7 +36,7 @@ pub(crate) struct Rules {
 struct Mark {
     cell: usize,
     seen: Time,
-    hits: u8,
+    weight: u8,
     blocks: bool,
 }
 
@@ -73,12 +79,22 @@ impl Overlay {
             Some((pose.compose(TofRanges::MOUNTS[sensor]), hit_m, free_m))
         });
         // What one sensor sees in this frame is not freed by its neighbour in the same frame.
+        self.free_below(field, pose);
         for (eye, _, free_m) in looks.clone() {
             self.pass_through(field, rules, eye, free_m);
         }
         for (eye, hit_m, _) in looks {
-            if let Some(cell) = hit_m.and_then(|hit_m| unexplained(field, rules, eye, hit_m)) {
-                self.hit(field, rules, now, cell);
+            let Some(hit_m) = hit_m else { continue };
+            // It may stand anywhere across the cone: what of that is free is seen from nearer by, or by a neighbour.
+            if let Some(across) = unexplained(field, rules, eye, hit_m) {
+                let mut last = None;
+                for end in across {
+                    let cell = field.grid().index_at(end.x, end.y).filter(|cell| last != Some(*cell));
+                    if let Some(cell) = cell {
+                        last = Some(cell);
+                        self.hit(field, rules, now, cell);
+                    }
+                }
             }
         }
     }
@@ -97,51 +113,72 @@ impl Overlay {
     fn hit(&mut self, field: &mut Field, rules: &Rules, now: Time, cell: usize) {
         if let Some(mark) = self.marks.iter_mut().find(|mark| mark.cell == cell) {
             mark.seen = now;
-            mark.hits = (mark.hits + 1).min(HITS_MAX);
+            mark.weight = (mark.weight + SIGHTING).min(WEIGHT_MAX);
         } else if self.marks.len() < MARKS_MAX {
-            self.marks.push(Mark { cell, seen: now, hits: 1, blocks: false });
+            self.marks.push(Mark { cell, seen: now, weight: SIGHTING, blocks: false });
         }
         if let Some(mark) = self.marks.iter_mut().find(|mark| mark.cell == cell)
             && !mark.blocks
-            && mark.hits >= rules.confirm
+            && mark.weight >= SIGHTING * rules.confirm
         {
             mark.blocks = true;
             field.set_obstacle(cell, true);
         }
     }
 
-    /// Marks that a reading passes lose a sighting; the last one frees the cell. Thin things flicker (COF-123), so one reading past
-    /// a pole does not free it at once.
+    /// Marks that a reading passes lose weight; the last loss frees the cell.
     fn pass_through(&mut self, field: &mut Field, rules: &Rules, eye: Pose2, free_m: f64) {
         let margin_m = 2.0 * field.grid().resolution_m();
+        let sure = SURE_SHARE * rules.half_cone_rad.tan();
+        self.lighten(field, 1, |place| {
+            let seen = eye.inverse_transform(place);
+            seen.x > 0.0 && seen.x < free_m - margin_m && seen.y.abs() <= seen.x * sure
+        });
+    }
+
+    /// Where the robot stands nothing else does.
+    fn free_below(&mut self, field: &mut Field, pose: Pose2) {
+        self.lighten(field, WEIGHT_MAX, |place| {
+            let inside = pose.inverse_transform(place);
+            inside.x.abs() < BODY_M[0] && inside.y.abs() < BODY_M[1]
+        });
+    }
+
+    fn lighten(&mut self, field: &mut Field, by: u8, concerns: impl Fn(Point2<f64>) -> bool) {
         self.marks.retain_mut(|mark| {
             let [x_m, y_m] = field.grid().to_map(field.grid().centre(mark.cell));
-            let seen = eye.inverse_transform(Point2::new(x_m, y_m));
-            let passed = seen.x > 0.0
-                && seen.coords.norm() < free_m - margin_m
-                && seen.y.abs() <= seen.x * rules.half_cone_rad;
-            if passed {
-                mark.hits = mark.hits.saturating_sub(1);
+            if concerns(Point2::new(x_m, y_m)) {
+                mark.weight = mark.weight.saturating_sub(by);
             }
-            if mark.hits == 0 && mark.blocks {
+            if mark.weight == 0 && mark.blocks {
                 field.set_obstacle(mark.cell, false);
             }
-            mark.hits > 0
+            mark.weight > 0
         });
     }
 }
 
-/// The cell at a reading's end, unless a known wall stands on the way or near the end.
-fn unexplained(field: &Field, rules: &Rules, eye: Pose2, range_m: f64) -> Option<usize> {
-    let end = eye.transform(Point2::new(range_m, 0.0));
+/// The places across the cone at a reading's range, unless a known wall stands on the way to one of them or near it: then the reading
+/// is that wall. The range counts along the axis.
+fn unexplained(
+    field: &Field,
+    rules: &Rules,
+    eye: Pose2,
+    range_m: f64,
+) -> Option<impl Iterator<Item = Point2<f64>> + use<>> {
     let grid = field.grid();
-    let cell = grid.index_at(end.x, end.y)?;
-    if field.wall_m(cell) < rules.wall_tolerance_m {
-        return None;
-    }
-    let (from, to) = (grid.to_cells([eye.x_m, eye.y_m]), grid.to_cells([end.x, end.y]));
-    let open = line::visit(from, to, |column, row| {
-        grid.checked_index(column, row).is_some_and(|cell| !grid.is_occupied(cell))
+    let half_m = range_m * rules.half_cone_rad.tan();
+    let steps = (4.0 * half_m / grid.resolution_m()).ceil().max(1.0) as i32;
+    let across = (0..=steps).map(move |step| {
+        let aside_m = half_m * (2.0 * f64::from(step) / f64::from(steps) - 1.0);
+        eye.transform(Point2::new(range_m, aside_m))
     });
-    open.then_some(cell)
+    let from = grid.to_cells([eye.x_m, eye.y_m]);
+    let open = across.clone().all(|end| {
+        grid.index_at(end.x, end.y).is_some_and(|cell| field.wall_m(cell) >= rules.wall_tolerance_m)
+            && line::visit(from, grid.to_cells([end.x, end.y]), |column, row| {
+                grid.checked_index(column, row).is_some_and(|cell| !grid.is_occupied(cell))
+            })
+    });
+    open.then_some(across)
 }

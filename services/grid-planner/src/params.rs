@@ -114,9 +114,9 @@ impl Default for Params {
             replan_interval_s: 1.0,
             range_max_m: 1.0,
             half_cone_rad: 0.13,
-            wall_tolerance_m: 0.2,
+            wall_tolerance_m: 0.12,
             confirm_sightings: 2,
-            obstacle_memory_s: 10.0,
+            obstacle_memory_s: 20.0,
             input_max_age_ms: 500,
             period_ms: 100,
         }

@@ -105,7 +105,7 @@ impl Default for Params {
             goal_tolerance_m: 0.5,
             approach_m: 1.2,
             right_door_m: 0.555,
-            left_door_m: 0.75,
+            left_door_m: 0.85,
             halt_tolerance_m: 0.05,
             halt_accept_m: 0.1,
             overrun_m: 0.7,

@@ -1,7 +1,7 @@
 //! What a delivery is judged by.
 
 use crate::{Inputs, Params, errors::Comparison};
-use geometry::{Point2, Polygon, Pose2, World};
+use geometry::{Point2, Polygon, Pose2, Surface, World};
 use messages::{
     AppliedWheels, Clearance, DeliveryStatusName, MissionStatus, RoomName, RunState, RunSummary, Stamped,
     Surroundings, Time, WorldTruth,
@@ -22,7 +22,8 @@ pub(crate) struct Delivery {
     now_s: f64,
     first_contacts: Option<u64>,
     contacts: u64,
-    least_clearance_m: f64,
+    nearest: Option<Nearness>,
+    touched: Option<Nearness>,
     last_place: Option<(Point2<f64>, i32)>,
     path_m: f64,
     guard_changes: (u64, u64),
@@ -31,6 +32,7 @@ pub(crate) struct Delivery {
     standing: Option<Halt>,
     halts: Vec<Halt>,
     fault_since: Option<Time>,
+    fault: String,
     pub(crate) comparison: Comparison,
 }
 
@@ -40,6 +42,15 @@ struct Halt {
     order_id: u64,
     room: RoomName,
     error_m: f64,
+}
+
+/// How near the robot was to what, and where it stood then.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Nearness {
+    distance_m: f64,
+    surface: Surface,
+    pose: Pose2,
+    at_s: f64,
 }
 
 /// How a run stands, and why.
@@ -55,7 +66,8 @@ impl Delivery {
             now_s: 0.0,
             first_contacts: None,
             contacts: 0,
-            least_clearance_m: f64::INFINITY,
+            nearest: None,
+            touched: None,
             last_place: None,
             path_m: 0.0,
             guard_changes: (0, 0),
@@ -64,6 +76,7 @@ impl Delivery {
             standing: None,
             halts: Vec::new(),
             fault_since: None,
+            fault: String::new(),
             comparison: Comparison::new(),
         }
     }
@@ -109,8 +122,21 @@ impl Delivery {
         }
         self.surroundings.show(truth.message, truth.elements);
         if let (Some(scene), Some(footprint)) = (self.surroundings.scene(truth.floor), &self.footprint) {
-            let clearance_m = scene.clearance_m(footprint, pose, [0.0, params.body_height_m], None);
-            self.least_clearance_m = self.least_clearance_m.min(clearance_m);
+            let nearest = scene.clearance(footprint, pose, [0.0, params.body_height_m], None);
+            let now = nearest.map(|nearest| Nearness {
+                distance_m: nearest.distance_m,
+                surface: nearest.surface,
+                pose,
+                at_s: self.now_s,
+            });
+            if let Some(now) = now
+                && self.nearest.is_none_or(|least| now.distance_m < least.distance_m)
+            {
+                self.nearest = Some(now);
+            }
+            if self.contacts > 0 && self.touched.is_none() {
+                self.touched = now;
+            }
         }
     }
 
@@ -124,6 +150,9 @@ impl Delivery {
     fn look_at_mission(&mut self, now: Time, mission: &MissionStatus, truth: &WorldTruth) {
         let status = mission.status.get().unwrap_or(DeliveryStatusName::Fault);
         if status == DeliveryStatusName::Fault {
+            if self.fault_since.is_none() {
+                self.fault = mission.remark.to_string();
+            }
             self.fault_since.get_or_insert(now);
         } else {
             self.fault_since = None;
@@ -154,11 +183,16 @@ impl Delivery {
 
     fn rule(&self, params: &Params, now: Time) -> Ruling {
         if self.contacts > 0 {
-            return (RunState::Failed, format!("the robot touched something {} times", self.contacts));
+            let what = self.touched.map(|touched| self.name(touched)).unwrap_or_default();
+            let contacts = self.contacts;
+            return (RunState::Failed, format!("the robot touched something {contacts} times, first {what}"));
         }
         let faulty_s = self.fault_since.map_or(0.0, |since| now.seconds_since(since));
         if self.fault_since.is_some() && faulty_s >= params.fault_limit_s {
-            return (RunState::Failed, format!("the mission reports a fault for {faulty_s:.0} s"));
+            return (
+                RunState::Failed,
+                format!("the mission reports a fault for {faulty_s:.0} s: {}", self.fault),
+            );
         }
         if let Some(halt) =
             self.halts.iter().find(|halt| halt.error_m.is_nan() || halt.error_m > params.max_halt_error_m)
@@ -174,7 +208,9 @@ impl Delivery {
         }
         if self.delivered >= params.deliveries.into() {
             let rooms: Vec<_> = self.halts.iter().map(|halt| halt.room.to_string()).collect();
-            return (RunState::Passed, format!("delivered to {}", rooms.join(", ")));
+            let nearest =
+                self.nearest.map(|nearest| format!("; nearest {}", self.name(nearest))).unwrap_or_default();
+            return (RunState::Passed, format!("delivered to {}{nearest}", rooms.join(", ")));
         }
         if params.time_limit_s > 0.0 && self.now_s > params.time_limit_s {
             return (RunState::Failed, format!("not done after {:.0} s", params.time_limit_s));
@@ -182,12 +218,30 @@ impl Delivery {
         (RunState::Running, format!("{} of {} delivered", self.delivered, params.deliveries))
     }
 
+    /// What was near, and from where, in words.
+    fn name(&self, nearness: Nearness) -> String {
+        let Nearness { surface, pose, at_s, distance_m } = nearness;
+        let furniture = |index: u32| self.world.furniture.get(index as usize);
+        let door = |index: u32| self.world.doors.get(index as usize);
+        let what = match surface {
+            Surface::Furniture(index) => furniture(index)
+                .map(|item| format!("{:?} at {:.1}, {:.1}", item.kind, item.pose.x_m, item.pose.y_m)),
+            Surface::Door(index) => door(index).map(|door| format!("door {}", door.room)),
+            other => Some(format!("{other:?}")),
+        };
+        let what = what.unwrap_or_default();
+        let Pose2 { x_m, y_m, .. } = pose;
+        let degrees = pose.heading_rad.to_degrees();
+        format!("{what}, {distance_m:.2} m from {x_m:.2}, {y_m:.2}, {degrees:.0} deg, after {at_s:.1} s")
+    }
+
     pub(crate) fn write(&self, summary: &mut RunSummary) {
         let worst_halt_m = self.halts.iter().map(|halt| halt.error_m).reduce(f64::max).unwrap_or(f64::NAN);
         summary.push("deliveries", self.delivered as f64, "");
         summary.push("halt distance from door centre", worst_halt_m, "m");
         summary.push("contacts", self.contacts as f64, "");
-        summary.push("least clearance", self.least_clearance_m, "m");
+        let least_clearance_m = self.nearest.map_or(f64::INFINITY, |nearest| nearest.distance_m);
+        summary.push("least clearance", least_clearance_m, "m");
         summary.push("stops by the guard", (self.guard_changes.0 / 2) as f64, "");
         summary.push("missed deadlines", self.deadline_misses as f64, "");
         summary.push("path length", self.path_m, "m");

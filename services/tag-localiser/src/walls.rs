@@ -79,7 +79,10 @@ impl HallwayWalls {
                 Agreeing { right: true, left: true, caution: 1.0 }
             }
             (Some(_), Some(_)) | (None, None) => Agreeing::default(),
-            // One side alone has nothing to be measured against: half as good.
+            // One side alone has nothing to be measured against: half as good, and not when something may stand before the wall.
+            (Some(alone_m), None) | (None, Some(alone_m)) if alone_m < -2.0 * sigma_m => {
+                Agreeing::default()
+            }
             (right, left) => Agreeing { right: right.is_some(), left: left.is_some(), caution: 4.0 },
         }
     }
