@@ -5,6 +5,7 @@ mod commands;
 mod conductor;
 mod control;
 mod detach;
+mod experiment;
 mod graph;
 mod lockstep;
 mod monitor;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
         Command::Logs(args) => commands::finish(commands::logs(&args)),
         Command::Restart(args) => commands::finish(commands::restart(&args)),
         Command::Stop(args) => commands::finish(commands::stop(&args)),
+        Command::Experiment(args) => experiment::command(&args),
         Command::Graph(args) => graph::graph_command(&args.which.request(None), args.dot),
         Command::Order(args) => commands::finish(commands::order(&args)),
         Command::Completions { shell } => {
