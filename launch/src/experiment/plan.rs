@@ -56,6 +56,12 @@ pub(super) enum PlanError {
         /// The name.
         name: String,
     },
+    /// A variant's axis that the others do not have.
+    #[error("`{key}` is varied across in a variant, but not in the experiment: name it under [across] too")]
+    NotAnAxis {
+        /// The key.
+        key: String,
+    },
     /// A limit that is none.
     #[error("limit_s = {limit_s} is not above zero")]
     NoLimit {
@@ -107,6 +113,9 @@ struct VariantTable {
     without: Vec<String>,
     seeds: Option<Seeds>,
     limit_s: Option<f64>,
+    /// Its own values of some of the situations' axes.
+    #[serde(default)]
+    across: Table,
     #[serde(default)]
     expect: BTreeMap<String, [f64; 2]>,
 }
@@ -256,7 +265,6 @@ pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanE
     }
     let for_all = Changes::of_tables(&file.set, &file.swap, &file.without)?;
     let combinations = product(&file.vary)?;
-    let situations = product(&file.across)?;
     if file.variant.is_empty() {
         file.variant.push(VariantTable {
             name: String::new(),
@@ -265,6 +273,7 @@ pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanE
             without: Vec::new(),
             seeds: None,
             limit_s: None,
+            across: Table::new(),
             expect: BTreeMap::new(),
         });
     }
@@ -276,6 +285,7 @@ pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanE
         if !(limit_s > 0.0 && limit_s.is_finite()) {
             return Err(PlanError::NoLimit { limit_s });
         }
+        let situations = product(&own_axes(&file.across, &table.across)?)?;
         let seeds = table.seeds.as_ref().unwrap_or(&file.seeds).list();
         let more = seeds.len().saturating_mul(situations.len()).saturating_mul(combinations.len());
         if seeds.is_empty() || runs.len().saturating_add(more) > RUNS_MAX {
@@ -313,6 +323,18 @@ pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanE
         axes: file.across.keys().cloned().collect(),
         runs,
     })
+}
+
+/// The axes of all, with a variant's own values for some of them.
+fn own_axes(all: &Table, own: &Table) -> Result<Table, PlanError> {
+    let mut axes = all.clone();
+    for (key, values) in own {
+        match axes.get_mut(key) {
+            Some(known) => *known = values.clone(),
+            None => return Err(PlanError::NotAnAxis { key: key.clone() }),
+        }
+    }
+    Ok(axes)
 }
 
 /// Every combination of the axes' values; one without changes if there are no axes.

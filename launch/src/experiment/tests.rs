@@ -37,6 +37,11 @@ fn variants_are_spelt_out() {
     check_names("[across]\n'navigator.default_order' = ['203', '207', '211']", 6, &["as the graph is"]);
     check_names("worlds = ['a.toml', 'b.toml']", 4, &["as the graph is"]);
     check_names("[[variant]]\nname = 'x'\n[[variant]]\nname = 'y'\nseeds = [1]", 3, &["x", "y"]);
+    check_names(
+        "[across]\n'a.b' = [1, 2]\n[[variant]]\nname = 'x'\n[[variant]]\nname = 'y'\nacross = { 'a.b' = [3] }",
+        6,
+        &["x", "y"],
+    );
     check_names("[vary]\nc = ['a', 'b']\n[[variant]]\nname = 'x'", 4, &["x, a", "x, b"]);
 }
 
@@ -54,6 +59,7 @@ fn wrong_plans_are_refused() {
         "between 1 and 100000",
     );
     check_refused("[[variant]]\nname = 'x'\nseeds = 'all'", "{ from = 1, count = 20 }");
+    check_refused("[[variant]]\nname = 'x'\nacross = { 'a.b' = [1] }", "`a.b` is varied across in a variant");
     check_refused("speed = 3", "unknown field `speed`");
 }
 
