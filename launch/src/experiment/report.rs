@@ -164,7 +164,12 @@ fn expectations(verdicts: &[Verdict], as_markdown: bool) -> Table {
             verdict.figure.clone(),
             format!("{} to {}", number(low), number(high)),
             verdict.found.map_or("-".to_owned(), number),
-            if verdict.holds() { "holds" } else { "DOES NOT HOLD" }.to_owned(),
+            match verdict.found {
+                None => "not run yet",
+                Some(_) if verdict.holds() => "holds",
+                Some(_) => "DOES NOT HOLD",
+            }
+            .to_owned(),
         ]);
     }
     table
