@@ -18,6 +18,8 @@ use std::time::Duration;
 const LOOK: Duration = Duration::from_millis(10);
 /// A child that was asked to leave has so long before it is killed.
 const LEAVE_WITHIN: Duration = Duration::from_secs(5);
+/// A run that cannot start is tried so often.
+const TRIES: usize = 3;
 /// No run takes as long as this; one that does hangs.
 const HANGS_AFTER: Duration = Duration::from_secs(1800);
 
@@ -85,14 +87,23 @@ impl Crew {
         let board = format!("experiment-{}-{place}", std::process::id());
         while !stop.load(Ordering::Acquire) {
             let Some(job) = queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front() else { return };
-            let mut command = self.command(&job.run, &board, processor);
-            let began = clock::monotonic();
-            let ended = run_child(&mut command, stop);
-            let wall_s = clock::monotonic().seconds_since(began);
-            if stop.load(Ordering::Acquire) {
-                return;
-            }
-            if records.send(record(job, wall_s, ended)).is_err() {
+            let mut tries = 0;
+            let record = loop {
+                let mut command = self.command(&job.run, &board, processor);
+                let began = clock::monotonic();
+                let ended = run_child(&mut command, stop);
+                let wall_s = clock::monotonic().seconds_since(began);
+                if stop.load(Ordering::Acquire) {
+                    return;
+                }
+                tries += 1;
+                let record = record(job.clone(), wall_s, ended);
+                // The variant was checked, so what cannot start is a machine with too much else to do.
+                if record.outcome != Outcome::Error || tries == TRIES {
+                    break record;
+                }
+            };
+            if records.send(record).is_err() {
                 return;
             }
         }
@@ -206,7 +217,9 @@ pub(super) fn record(job: Job, wall_s: f64, ended: Ended) -> Record {
         Some(value)
     });
     let Some(said) = said else {
-        let complaint = ended.stderr.lines().rev().find(|line| !line.trim().is_empty());
+        // The first error says why, the last line only that there was one.
+        let mut lines = ended.stderr.lines().filter(|line| !line.trim().is_empty());
+        let complaint = lines.clone().find(|line| line.starts_with("error")).or_else(|| lines.next_back());
         record.remark = complaint.unwrap_or("it said nothing").trim().to_owned();
         return record;
     };
