@@ -6,6 +6,7 @@ mod compare;
 mod conductor;
 mod control;
 mod detach;
+mod experiment;
 mod graph;
 mod lockstep;
 mod monitor;
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
         Command::Logs(args) => commands::finish(commands::logs(&args)),
         Command::Restart(args) => commands::finish(commands::restart(&args)),
         Command::Stop(args) => commands::finish(commands::stop(&args)),
+        Command::Experiment(args) => experiment::command(&args),
         Command::Graph(args) => graph::graph_command(&args.which.request(None), args.dot),
         Command::Order(args) => commands::finish(commands::order(&args)),
         Command::Digest { file, json } => commands::finish(compare::digest(&file, json)),
