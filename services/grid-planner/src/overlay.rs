@@ -83,12 +83,17 @@ impl Overlay {
         for (eye, _, free_m) in looks.clone() {
             self.pass_through(field, rules, eye, free_m);
         }
-        for (eye, hit_m, _) in looks {
+        let margin_m = 2.0 * field.grid().resolution_m();
+        let free = |place: Point2<f64>| {
+            looks.clone().any(|(eye, _, free_m)| surely_sees(rules, eye, free_m - margin_m, place))
+        };
+        for (eye, hit_m, _) in looks.clone() {
             let Some(hit_m) = hit_m else { continue };
-            // It may stand anywhere across the cone: what of that is free is seen from nearer by, or by a neighbour.
+            // It may stand anywhere across the cone, but for where a neighbour sees through; the rest is seen from nearer by.
             if let Some(across) = unexplained(field, rules, eye, hit_m) {
+                let all_free = across.clone().all(free);
                 let mut last = None;
-                for end in across {
+                for end in across.filter(|end| all_free || !free(*end)) {
                     let cell = field.grid().index_at(end.x, end.y).filter(|cell| last != Some(*cell));
                     if let Some(cell) = cell {
                         last = Some(cell);
@@ -129,11 +134,7 @@ impl Overlay {
     /// Marks that a reading passes lose weight; the last loss frees the cell.
     fn pass_through(&mut self, field: &mut Field, rules: &Rules, eye: Pose2, free_m: f64) {
         let margin_m = 2.0 * field.grid().resolution_m();
-        let sure = SURE_SHARE * rules.half_cone_rad.tan();
-        self.lighten(field, 1, |place| {
-            let seen = eye.inverse_transform(place);
-            seen.x > 0.0 && seen.x < free_m - margin_m && seen.y.abs() <= seen.x * sure
-        });
+        self.lighten(field, 1, |place| surely_sees(rules, eye, free_m - margin_m, place));
     }
 
     /// Where the robot stands nothing else does.
@@ -158,6 +159,12 @@ impl Overlay {
     }
 }
 
+/// Whether a sensor that sees nothing nearer than `reach_m` would have seen a thing at `place`.
+fn surely_sees(rules: &Rules, eye: Pose2, reach_m: f64, place: Point2<f64>) -> bool {
+    let seen = eye.inverse_transform(place);
+    seen.x > 0.0 && seen.x < reach_m && seen.y.abs() <= SURE_SHARE * rules.half_cone_rad.tan() * seen.x
+}
+
 /// The places across the cone at a reading's range, unless a known wall stands on the way to one of them or near it: then the reading
 /// is that wall. The range counts along the axis.
 fn unexplained(
@@ -165,7 +172,7 @@ fn unexplained(
     rules: &Rules,
     eye: Pose2,
     range_m: f64,
-) -> Option<impl Iterator<Item = Point2<f64>> + use<>> {
+) -> Option<impl Iterator<Item = Point2<f64>> + Clone + use<>> {
     let grid = field.grid();
     let half_m = range_m * rules.half_cone_rad.tan();
     let steps = (4.0 * half_m / grid.resolution_m()).ceil().max(1.0) as i32;

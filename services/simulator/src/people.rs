@@ -4,7 +4,9 @@ use crate::{Params, obstacles::Footprint};
 use geometry::{Pose2, world::Walker};
 
 /// So near a squeezing person comes, and no nearer.
-const SQUEEZE_M: f64 = 0.05;
+const SQUEEZE_M: f64 = 0.12;
+/// From a robot that moves so near to them people step back.
+const STEP_BACK_M: f64 = 0.25;
 
 /// One person.
 #[derive(Debug, Clone)]
@@ -41,7 +43,7 @@ impl Person {
     }
 
     /// One step along the path, unless the robot is in the way. A person approaches the robot's body up to `walkers_wait_m`, waits
-    /// there, and squeezes past when the robot has stood there for a while.
+    /// there, steps back the way it came when the robot comes nearer, and squeezes past when the robot has stood there for a while.
     pub(crate) fn walk(&mut self, params: &Params, now_s: f64, seconds: f64, robot: &RobotSeen) {
         let here = robot.floor == self.walker.floor;
         if !self.has_set_out {
@@ -55,8 +57,16 @@ impl Person {
         if here && params.walkers_wait {
             let gap_m =
                 |pose: Pose2| robot.footprint.distance_m(robot.pose, pose.position()) - self.walker.radius_m;
-            let next_m = gap_m(next);
-            let approaches = next_m < gap_m(self.pose);
+            let (now_m, next_m) = (gap_m(self.pose), gap_m(next));
+            let approaches = next_m < now_m;
+            if !robot.stands && now_m < STEP_BACK_M && approaches {
+                let back_s = (self.walked_s - seconds).max(0.0);
+                let back = self.walker.pose(back_s);
+                if gap_m(back) > now_m {
+                    (self.walked_s, self.pose) = (back_s, back);
+                    return;
+                }
+            }
             let patient = self.waited_s < params.walkers_patience_s || !robot.stands;
             let limit_m = if patient { params.walkers_wait_m } else { SQUEEZE_M };
             if approaches && next_m < limit_m {
