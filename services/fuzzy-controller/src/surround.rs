@@ -108,32 +108,39 @@ impl Surround {
     /// The motion nearest to the wanted one that keeps away from everything seen; standing when there is none.
     pub(crate) fn allowed(&self, wanted: Wheels, params: &Params) -> Wheels {
         let (Some(here), true) = (self.here, params.keep_away_m > 0.0) else { return wanted };
-        let [left, right] = wanted;
-        let forward_mps = 0.5 * (left + right);
-        let fastest_mps = left.abs().max(right.abs());
+        let forward_mps = 0.5 * (wanted[0] + wanted[1]);
+        let fastest_mps = wanted[0].abs().max(wanted[1].abs());
         if fastest_mps <= 0.0 || self.is_clear(here, wanted, 2.0 * params.keep_away_m, params) {
             return wanted;
         }
-        let slower = (SLOW_MPS / fastest_mps).min(1.0);
-        let slow = wanted.map(|speed| slower * speed);
-        let mut tries = vec![slow];
-        if forward_mps.abs() > 0.25 * fastest_mps {
-            // Straighter, then straight.
-            let mean = 0.5 * (slow[0] + slow[1]);
-            let turn = 0.5 * (slow[1] - slow[0]);
-            tries.extend([0.5, 0.0, -0.5].map(|share| [mean - share * turn, mean + share * turn]));
-        } else {
-            // A turn on the spot that would touch something is driven as a curve.
-            let turn = 0.5 * (slow[1] - slow[0]);
-            tries.extend([1.0, 2.0, -1.0, -2.0].map(|share| {
-                let mean = share * turn.abs();
-                limited([mean - turn, mean + turn])
-            }));
+        let slow = limited(wanted);
+        if self.is_clear(here, slow, params.keep_away_m, params) {
+            return slow;
         }
-        let clear = |margin_m: f64| {
-            tries.iter().copied().find(|wheels| self.is_clear(here, *wheels, margin_m, params))
+        // Of what is left the motion that gets on best, and then the one that turns most alike.
+        let ([left, right], direction) = (slow, forward_mps.signum());
+        let (slow_mps, rim_mps) = (0.5 * (left + right), 0.5 * (right - left));
+        // A turn on the spot may become a curve, in either direction.
+        let speeds: &[f64] = if forward_mps.abs() > 0.25 * fastest_mps {
+            &[1.0, 0.6, 0.3, 0.0]
+        } else {
+            &[0.0, 0.3, 0.6, -0.3, -0.6]
         };
-        clear(params.keep_away_m).unwrap_or([0.0; 2])
+        let tries = speeds.iter().flat_map(|share| {
+            let mean_mps = share * SLOW_MPS * direction;
+            (-4..=4).map(move |turn| {
+                let rim_mps = 0.25 * f64::from(turn) * SLOW_MPS;
+                [mean_mps - rim_mps, mean_mps + rim_mps]
+            })
+        });
+        let cost = |[left, right]: &Wheels| {
+            let (mean, rim) = (0.5 * (left + right), 0.5 * (right - left));
+            3.0 * (mean - slow_mps).abs() + (rim - rim_mps).abs()
+        };
+        let mut tries: Vec<Wheels> = tries.filter(|[left, right]| left.abs() + right.abs() > 0.0).collect();
+        tries.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+        let clear = tries.into_iter().find(|wheels| self.is_clear(here, *wheels, params.keep_away_m, params));
+        clear.map_or([0.0; 2], limited)
     }
 
     /// Whether, during the next moment, nothing seen comes nearer to the body than `margin_m`, or than it is already.

@@ -219,7 +219,7 @@ impl Field {
             return;
         }
         let rings = self.near.iter().filter(|ring| ring[cell] > 0).count();
-        let beside = self.clearance_weight as f32 * 0.5 * rings as f32 * SIXTEENTHS;
+        let beside = self.clearance_weight as f32 * 0.25 * rings as f32 * SIXTEENTHS;
         self.extra[cell] = self.walls_extra[cell].map(|walls| walls.saturating_add(beside as u8));
     }
 }
