@@ -80,9 +80,7 @@ impl HallwayWalls {
             }
             (Some(_), Some(_)) | (None, None) => Agreeing::default(),
             // One side alone has nothing to be measured against: half as good, and not when something may stand before the wall.
-            (Some(alone_m), None) | (None, Some(alone_m)) if alone_m < -2.0 * sigma_m => {
-                Agreeing::default()
-            }
+            (Some(alone_m), None) | (None, Some(alone_m)) if alone_m < -2.0 * sigma_m => Agreeing::default(),
             (right, left) => Agreeing { right: right.is_some(), left: left.is_some(), caution: 4.0 },
         }
     }
