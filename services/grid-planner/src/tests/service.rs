@@ -156,11 +156,14 @@ fn one_reading_is_not_yet_an_obstacle_and_passing_readings_free_it() {
         planner.obstacle_cells()
     };
     assert_eq!(look(&mut planner, 0, &[(3, 0.5)]), 0);
-    assert_eq!(look(&mut planner, 1, &[(3, 0.5)]), 1);
-    assert_eq!(look(&mut planner, 2, &[(3, 0.5)]), 1);
-    assert_eq!(look(&mut planner, 3, &[]), 1, "it was seen three times");
-    assert_eq!(look(&mut planner, 4, &[]), 1);
-    assert_eq!(look(&mut planner, 5, &[]), 0);
+    // It may stand anywhere across the cone in which it was seen.
+    let across = look(&mut planner, 1, &[(3, 0.5)]);
+    assert!(across >= 1, "two readings are an obstacle");
+    assert!(look(&mut planner, 2, &[(3, 0.5)]) >= across);
+    let passing: Vec<usize> = (3..30).map(|tenths| look(&mut planner, tenths, &[])).collect();
+    assert!(passing[0] >= 1, "it was seen three times: {passing:?}");
+    assert!(passing.is_sorted_by(|earlier, later| earlier >= later), "{passing:?}");
+    assert!(passing.last().is_some_and(|left| *left < across), "{passing:?}");
 }
 
 #[test]
@@ -169,10 +172,11 @@ fn what_is_not_seen_again_is_forgotten() {
     for tenths in 0..3 {
         step(&mut planner, tenths, &request(1, 18.0), &estimate(0.0, 0.0), Some(&ranges(&[(3, 0.5)])));
     }
-    assert_eq!(planner.obstacle_cells(), 1);
+    let seen = planner.obstacle_cells();
+    assert!(seen >= 1);
     step(&mut planner, 90, &request(1, 18.0), &estimate(5.0, 0.0), None);
-    assert_eq!(planner.obstacle_cells(), 1);
-    step(&mut planner, 110, &request(1, 18.0), &estimate(5.0, 0.0), None);
+    assert_eq!(planner.obstacle_cells(), seen);
+    step(&mut planner, 900, &request(1, 18.0), &estimate(5.0, 0.0), None);
     assert_eq!(planner.obstacle_cells(), 0);
 }
 
@@ -181,7 +185,7 @@ fn a_blocked_hallway_is_said_once_and_planned_when_it_opens() {
     let mut planner = planner();
     let wall = [(2, 0.6), (3, 0.6), (4, 0.6), (5, 0.6)];
     let mut states = Vec::new();
-    for tenths in 0..200_u64 {
+    for tenths in 0..400_u64 {
         let seen = if tenths < 60 { ranges(&wall) } else { ranges(&[]) };
         let y_m = if tenths % 20 < 10 { 0.35 } else { -0.35 };
         let answer = step(&mut planner, tenths, &request(1, 18.0), &estimate(2.0, y_m), Some(&seen));
