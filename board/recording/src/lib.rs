@@ -2,7 +2,7 @@
 //!
 //! A recording is an MCAP file (<https://mcap.dev/spec>) of profile `ros2`: each topic a channel of encoding `cdr` with a generated
 //! `ros2msg` schema, so that the tools of ROS 2 and Foxglove read it. What they do not know lies beside it where they do not look: the table of
-//! contents with the descriptions of all messages as metadata, and the rest of the envelope in private records (see [`format`]). The
+//! contents with the descriptions of all messages as metadata, and the rest of the envelope in private records (see [`mod@format`]). The
 //! crate knows neither the board nor the clock: moments come in as arguments.
 
 pub mod format;
