@@ -1,8 +1,9 @@
-//! Round trips between two processes: the board as services use it, the bare transport with the same settings, and a bare futex as the floor.
+//! Round trips between two processes: the board as services use it, the bare transport with the same settings,
+//! the same with a stamp that is written and looked at, and a bare futex as the floor.
 //!
 //! All in one run and in turn, block by block, so that whatever else the machine does hits all alike. Polling: both sides look for the
 //! newest message without a pause. Waiting: both sleep until they are woken. Each side touches three bytes of the message.
-//! `cargo bench -p board --bench round_trip [-- BLOCKS]`
+//! `cargo bench -p board --bench round_trip [-- [BLOCKS] [polling|waiting]]`
 
 use board::host::Host;
 use board::manifest::{Manifest, Topic};
@@ -57,11 +58,21 @@ struct Params {
     processors: [usize; 2],
     /// The folder of the bare contestants.
     folder: PathBuf,
+    /// Whether the bare transport stamps its messages and looks at the stamps, as the board does.
+    stamped: bool,
 }
 
 impl Default for Params {
     fn default() -> Self {
-        Self { bytes: 64, polling: true, trips: 1, warm_up: 0, processors: [0, 0], folder: PathBuf::new() }
+        Self {
+            bytes: 64,
+            polling: true,
+            trips: 1,
+            warm_up: 0,
+            processors: [0, 0],
+            folder: PathBuf::new(),
+            stamped: false,
+        }
     }
 }
 
@@ -103,7 +114,12 @@ struct Block {
 }
 
 fn compare() -> Result<(), Failure> {
-    let blocks = std::env::args().skip(1).find_map(|text| text.parse().ok()).unwrap_or(BLOCKS);
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|text| !text.starts_with('-')).collect();
+    let blocks = arguments.iter().find_map(|text| text.parse().ok()).unwrap_or(BLOCKS);
+    let chosen = |how: &str| {
+        let mut words = arguments.iter().filter(|text| text.parse::<usize>().is_err()).peekable();
+        words.peek().is_none() || words.any(|word| word == how)
+    };
     let mut all = CpuSet::new();
     let affinity = rustix::thread::sched_getaffinity(None)?;
     (0..1024).filter(|&processor| affinity.is_set(processor)).for_each(|processor| all.set(processor));
@@ -112,46 +128,51 @@ fn compare() -> Result<(), Failure> {
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     println!("{blocks} blocks each; load before: {}", load.split(' ').next().unwrap_or_default());
     println!(
-        "{:<9} {:<9} {:>5}  {:>17} {:>17} {:>17}  {:>11} {:>11}",
-        "", "", "", "board p50/p99", "iceoryx2 p50/p99", "futex p50/p99", "p50 ratio", "p99 ratio"
+        "{:<24} {:>17} {:>17} {:>17} {:>17} {:>10} {:>10}",
+        "p50 and p99, us", "board", "iceoryx2", "iceoryx2 stamped", "futex", "to bare", "to stamped"
     );
     for (how, polling, processors) in [
         ("polling", true, [first, second]),
         ("waiting", false, [first, second]),
         ("waiting", false, [first, first]),
     ] {
+        if !chosen(how) {
+            continue;
+        }
         let place = if processors[0] == processors[1] { "one core" } else { "two cores" };
         for (name, bytes) in SIZES {
             let trips = if polling { 20_000 } else { 1500 };
             let params =
-                Params { bytes, polling, trips, warm_up: trips / 10, processors, folder: PathBuf::new() };
-            let mut seen: [Vec<Block>; 3] = Default::default();
+                Params { bytes, polling, trips, warm_up: trips / 10, processors, ..Params::default() };
+            let mut seen: [Vec<Block>; 4] = Default::default();
             for block in 0..blocks {
                 // Turned by one each time, so that none always runs after the same other.
-                for turn in 0..3 {
-                    let which = (block + turn) % 3;
+                for turn in 0..4 {
+                    let which = (block + turn) % 4;
                     seen[which].push(match which {
                         0 => board_block(&params)?,
                         1 => pair("bare", &params)?,
+                        2 => pair("bare", &Params { stamped: true, ..params.clone() })?,
                         _ => pair("futex", &params)?,
                     });
                 }
             }
-            let [board, bare, futex] = &seen;
-            let ratio = |of: fn(&Block) -> f64| {
-                median(board.iter().zip(bare).map(|(board, bare)| of(board) / of(bare)).collect())
+            let [board, bare, stamped, futex] = &seen;
+            let ratio = |others: &[Block]| {
+                median(board.iter().zip(others).map(|(board, other)| board.p50 / other.p50).collect())
             };
             println!(
-                "{how:<9} {place:<9} {name:>5}  {} {} {}  {:>11.2} {:>11.2}",
+                "{how:<8} {place:<9} {name:>5} {} {} {} {} {:>10.2} {:>10.2}",
                 shown(board),
                 shown(bare),
+                shown(stamped),
                 shown(futex),
-                ratio(|block| block.p50),
-                ratio(|block| block.p99)
+                ratio(bare),
+                ratio(stamped),
             );
         }
     }
-    println!("in microseconds, medians over the blocks; the ratios are medians of the ratios block by block");
+    println!("medians over the blocks; the ratios are medians of the ratios of p50 block by block");
     Ok(())
 }
 
@@ -438,6 +459,10 @@ fn bare(is_ping: bool) -> Result<(), Failure> {
     let mut held = None;
     let mut newest = || -> Result<Option<u64>, Failure> {
         while let Some(sample) = subscriber.receive()? {
+            let envelope = *sample.user_header();
+            if params.stamped && envelope.stamp_ns > clock::monotonic().as_nanos() {
+                continue;
+            }
             held = Some(sample);
         }
         let Some(sample) = &held else { return Ok(None) };
@@ -447,7 +472,9 @@ fn bare(is_ping: bool) -> Result<(), Failure> {
     };
     let send = |number: u64| -> Result<(), Failure> {
         let mut sample = publisher.loan_slice_uninit(params.bytes)?;
-        sample.user_header_mut().sequence = number;
+        let stamp_ns = if params.stamped { clock::monotonic().as_nanos() } else { 0 };
+        *sample.user_header_mut() =
+            Envelope { stamp_ns, origin_ns: stamp_ns, sequence: number, generation: 1, round: 0 };
         // SAFETY: bytes of a mapped file have some value, and any will do.
         let mut sample = unsafe { sample.assume_init() };
         let (head, rest) = sample.payload_mut().split_at_mut(8);

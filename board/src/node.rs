@@ -149,7 +149,8 @@ impl Joined {
     ) -> Result<PublisherLink, JoinError> {
         let (index, _) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
         let publisher = Rc::new(self.member.open(topic, fingerprint)?.publisher(bytes)?);
-        let link = PublisherLink { shared: Rc::clone(&self.shared), topic: index, publisher, measures: false };
+        let link =
+            PublisherLink { shared: Rc::clone(&self.shared), topic: index, publisher, measures: false };
         self.publishers.push(link.clone());
         Ok(link)
     }

@@ -26,10 +26,51 @@ pub(crate) struct ReaderLink {
 }
 
 impl ReaderLink {
+    /// Takes the newest message that this step may see and that is `valid`, into `held`. A message that is not what its topic says is left
+    /// out; the last good one stays. One call into this crate for the whole look, since it is made over and over where somebody polls.
+    #[inline(never)]
+    fn newest(&mut self, held: &mut Option<RawMessage>, valid: fn(&[u8]) -> bool) {
+        while let Some(message) = self.next() {
+            let sequence = message.envelope().sequence;
+            if valid(message.bytes()) {
+                *held = Some(message);
+            } else {
+                self.shared.invalid.set(self.shared.invalid.get() + 1);
+            }
+            // The count says whether another one waits; asking the transport costs as much as a message.
+            let count = self
+                .shared
+                .switchboard
+                .topic(self.topic)
+                .map_or(u64::MAX, |entry| entry.count.load(Ordering::Acquire));
+            if sequence >= count {
+                break;
+            }
+        }
+    }
+
+    /// Takes the next message in order that is `valid` into `held`; false when there is none.
+    #[inline(never)]
+    fn next_in_order(&mut self, held: &mut Option<RawMessage>, valid: fn(&[u8]) -> bool) -> bool {
+        while let Some(message) = self.next() {
+            self.count_gap(message.envelope().sequence);
+            if valid(message.bytes()) {
+                *held = Some(message);
+                return true;
+            }
+            self.shared.invalid.set(self.shared.invalid.get() + 1);
+        }
+        false
+    }
+
     /// The next message that this step may see.
-    pub(crate) fn next(&mut self) -> Option<RawMessage> {
+    #[inline(always)]
+    fn next(&mut self) -> Option<RawMessage> {
         loop {
-            let message = self.early.take().or_else(|| self.reader.receive())?;
+            let message = match self.early.take() {
+                None => self.reader.receive()?,
+                Some(early) => early,
+            };
             let envelope = *message.envelope();
             match self.shared.visibility(Time::from_nanos(envelope.stamp_ns), envelope.round) {
                 Visibility::Now => {}
@@ -80,14 +121,7 @@ impl<T: Message> Latest<T> {
     /// The newest message, borrowed from shared memory; the same one again if nothing came since. `None` before the first.
     pub fn read(&mut self) -> Option<Stamped<'_, T>> {
         let link = self.link.as_mut()?;
-        while let Some(message) = link.next() {
-            // A message that is not what its topic says is left out; the last good one stays.
-            if View::<T>::parse(message.bytes()).is_ok() {
-                self.held = Some(message);
-            } else {
-                link.shared.invalid.set(link.shared.invalid.get() + 1);
-            }
-        }
+        link.newest(&mut self.held, |bytes| View::<T>::parse(bytes).is_ok());
         let stamped = stamped(self.held.as_ref()?)?;
         if self.ages {
             link.shared.note_origin(stamped.origin);
@@ -127,14 +161,8 @@ impl<T: Message> Queue<T> {
     #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self) -> Option<Stamped<'_, T>> {
         let link = self.link.as_mut()?;
-        loop {
-            let message = link.next()?;
-            link.count_gap(message.envelope().sequence);
-            if View::<T>::parse(message.bytes()).is_ok() {
-                self.held = Some(message);
-                break;
-            }
-            link.shared.invalid.set(link.shared.invalid.get() + 1);
+        if !link.next_in_order(&mut self.held, |bytes| View::<T>::parse(bytes).is_ok()) {
+            return None;
         }
         let stamped = stamped(self.held.as_ref()?)?;
         link.shared.note_origin(stamped.origin);

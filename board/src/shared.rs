@@ -6,6 +6,9 @@ use messages::Time;
 use std::cell::Cell;
 use std::sync::atomic::Ordering;
 
+/// How far a stamp may lie ahead of the last look at the clock.
+const FUTURE: std::time::Duration = std::time::Duration::from_millis(5);
+
 /// The state behind all ports of a node. Ports stay in their thread.
 #[derive(Debug)]
 pub(crate) struct Shared {
@@ -16,6 +19,8 @@ pub(crate) struct Shared {
     /// The moment of the present step.
     now: Cell<Time>,
     round: Cell<u32>,
+    /// When the clock was last looked at because of a stamp.
+    looked: Cell<Time>,
     /// The oldest origin among the messages read in this step.
     origin: Cell<Option<Time>>,
     pub(crate) lost: Cell<u64>,
@@ -33,6 +38,7 @@ impl Shared {
             lockstep,
             now: Cell::new(Time::ZERO),
             round: Cell::new(0),
+            looked: Cell::new(Time::ZERO),
             origin: Cell::new(None),
             lost: Cell::new(0),
             invalid: Cell::new(0),
@@ -61,7 +67,8 @@ impl Shared {
 
     /// Whether a message stamped so may be seen in this step.
     ///
-    /// In lockstep a step sees what was published before its round. Live, a stamp from the future is a lie: it would stay fresh for ever.
+    /// In lockstep a step sees what was published before its round. Live, a stamp from the future is a lie: it would stay fresh for ever. A
+    /// step's `now` is a little older than a message that came during the step, hence the tolerance, by which such a lie can gain at most.
     pub(crate) fn visibility(&self, stamp: Time, round: u32) -> Visibility {
         let now = self.now.get();
         if self.lockstep {
@@ -71,15 +78,20 @@ impl Shared {
                 Visibility::Later
             };
         }
-        if stamp <= now || stamp <= clock::monotonic() { Visibility::Now } else { Visibility::Never }
+        let horizon = self.looked.get().max(now).after(FUTURE);
+        if stamp <= horizon {
+            return Visibility::Now;
+        }
+        // Whoever polls within one step looks at the clock again, but not for every message.
+        self.looked.set(clock::monotonic());
+        if stamp <= self.looked.get().after(FUTURE) { Visibility::Now } else { Visibility::Never }
     }
 
     /// Notes that a message with this origin enters the step.
     pub(crate) fn note_origin(&self, origin: Time) {
         let oldest = self.origin.get().map_or(origin, |oldest| oldest.min(origin));
         self.origin.set(Some(oldest));
-        let age = self.now.get().since(oldest).as_nanos();
-        self.oldest_input_ns.set(u64::try_from(age).unwrap_or(u64::MAX));
+        self.oldest_input_ns.set(self.now.get().as_nanos().saturating_sub(oldest.as_nanos()));
     }
 
     /// The origin of what is published now: that of the oldest input, or this moment for a sensor.

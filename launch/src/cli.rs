@@ -10,6 +10,7 @@ Examples:
   launch up coffee                                 start it, watch it, Ctrl-C stops it
   launch up coffee --swap planner=sampling-planner --seed 7
   launch up coffee --set collision-avoidance.front_radius_m=0.25 --detach
+  launch experiment coffee                         many runs, with statistics and plots
   launch order 207                                 coffee for room 207, please
   launch logs planner -f                           follow what the planner says
   launch stop                                      stop the robot, then its services";
@@ -44,6 +45,9 @@ pub(crate) enum Command {
     Restart(RestartArgs),
     /// Stop a running graph: the robot first, then its services
     Stop(StopArgs),
+    /// Run variants of a graph many times in lockstep, and compare them
+    #[command(after_help = EXPERIMENT_HELP)]
+    Experiment(ExperimentArgs),
     /// Draw services and topics
     #[command(
         after_help = "Examples:\n  launch graph coffee > coffee.mmd\n  launch graph coffee --dot | dot -Tsvg > coffee.svg"
@@ -51,6 +55,28 @@ pub(crate) enum Command {
     Graph(GraphArgs),
     /// Order a coffee to a room
     Order(OrderArgs),
+    /// Hash a recording: equal for equal runs
+    Digest {
+        /// The recording
+        #[arg(value_name = "FILE.mcap", value_hint = clap::ValueHint::FilePath)]
+        file: PathBuf,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Show where two recorded runs first differ: topic, logical time, field and both values
+    #[command(after_help = "Exit code: 0 the runs are the same, 1 they differ.")]
+    Diff {
+        /// One recording
+        #[arg(value_name = "A.mcap", value_hint = clap::ValueHint::FilePath)]
+        a: PathBuf,
+        /// The other
+        #[arg(value_name = "B.mcap", value_hint = clap::ValueHint::FilePath)]
+        b: PathBuf,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
     /// Print completions for a shell
     #[command(
         after_help = "Example:\n  launch completions bash > ~/.local/share/bash-completion/completions/launch"
@@ -75,6 +101,15 @@ Examples:
   launch up coffee
   launch up coffee --without elevator --set planner.launch.log=debug
   launch up ./my-robot.toml --detach --board lab-2";
+
+const EXPERIMENT_HELP: &str = "\
+Every finished run is in runs.csv at once: after an interruption the same command does the rest. Runs whose binaries, worlds or
+parameters have changed since are done again.
+Exit code: 0 all runs were done and every expectation of the file holds, 1 otherwise.
+
+Examples:
+  launch experiment coffee
+  launch experiment ./radii.toml --jobs 1 --out /tmp/radii";
 
 /// Which graph, and what is different about it this time.
 #[derive(Debug, Clone, Args)]
@@ -165,6 +200,9 @@ pub(crate) struct UpArgs {
     /// In lockstep: the processor for the whole graph
     #[arg(long, value_name = "N", requires = "lockstep")]
     pub(crate) cpu: Option<usize>,
+    /// In lockstep: record every message into this file (MCAP)
+    #[arg(long, value_name = "FILE.mcap", requires = "lockstep", value_hint = clap::ValueHint::FilePath)]
+    pub(crate) record: Option<PathBuf>,
     /// Print the referee's figures as JSON at the end
     #[arg(long)]
     pub(crate) json: bool,
@@ -221,6 +259,32 @@ pub(crate) struct StopArgs {
     /// The board.
     #[command(flatten)]
     pub(crate) running: Running,
+}
+
+/// `launch experiment`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ExperimentArgs {
+    /// An experiment's name (`coffee`), or the path of its file
+    #[arg(value_name = "EXPERIMENT", value_hint = clap::ValueHint::FilePath)]
+    pub(crate) file: PathBuf,
+    /// How many runs at once; as many as there are processors without
+    #[arg(long, value_name = "N")]
+    pub(crate) jobs: Option<usize>,
+    /// Where runs.csv, table.md and the plots go; `results/NAME` without
+    #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
+    pub(crate) out: Option<PathBuf>,
+    /// Go on where an interrupted experiment was; that is always done, unless --fresh is given
+    #[arg(long, hide = true)]
+    pub(crate) resume: bool,
+    /// Do all runs again
+    #[arg(long, conflicts_with = "resume")]
+    pub(crate) fresh: bool,
+    /// Check every variant and list them, without a run
+    #[arg(long)]
+    pub(crate) dry_run: bool,
+    /// In a source checkout: use what is built already
+    #[arg(long)]
+    pub(crate) no_build: bool,
 }
 
 /// `launch graph`.

@@ -3,13 +3,15 @@
 use crate::conductor::{Conductor, Discord};
 use crate::graph::Checked;
 use crate::monitor::Monitor;
-use crate::observer::{Digest, Observer};
+use crate::observer::Observer;
 use crate::summary;
 use crate::supervise::{Phase, Supervisor};
 use crate::up::{Display, Options, Signals};
 use board::clock;
 use board::tap::Tap;
 use messages::{RunState, RunSummary, Time};
+use recording::Digest;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -25,6 +27,8 @@ pub(crate) struct Pace {
     pub(crate) until_s: Option<f64>,
     /// The processor for the whole graph.
     pub(crate) cpu: Option<usize>,
+    /// Record every message here.
+    pub(crate) record: Option<PathBuf>,
 }
 
 /// What a run in logical time has come to.
@@ -53,7 +57,7 @@ pub(crate) fn run(
     let board = options.board.as_deref().unwrap_or(&graph.name);
     let mut graph = graph.clone();
     // Turns are handed around thousands of times a second. On one processor that costs a switch; across two, an interrupt.
-    let cpu = pace.cpu.unwrap_or_else(|| last_processor());
+    let cpu = pace.cpu.unwrap_or_else(last_processor);
     for service in graph.services.iter_mut().filter(|service| service.launch.cpu.is_empty()) {
         service.launch.cpu = vec![cpu];
     }
@@ -62,7 +66,8 @@ pub(crate) fn run(
     rustix::thread::sched_setaffinity(None, &set)?;
     let mut supervisor = Supervisor::new(&graph, board, options.logs.as_deref(), true)?;
     let observer = Tap::join(supervisor.host.place().clone(), "observer")
-        .and_then(|tap| Observer::new(tap, graph.finish.as_deref()));
+        .map_err(Into::into)
+        .and_then(|tap| Observer::new(tap, graph.finish.as_deref(), pace.record.as_deref()));
     let mut observer = match observer {
         Ok(observer) => observer,
         Err(error) => {
@@ -86,8 +91,10 @@ pub(crate) fn run(
             supervisor.last_log_lines(&role, 12).iter().for_each(|line| eprintln!("  {line}"));
         }
     }
+    let recorded = observer.finish();
     drop(observer);
     supervisor.stop(&|| signals.count() > 1)?;
+    recorded?;
     outcome
 }
 
@@ -132,7 +139,15 @@ fn play(
         };
         // Many instants for one glance: the glance looks at processes and the screen.
         loop {
-            match conductor.play_instant(&supervisor.host, &mut |_, _| observer.look(), &mut lives) {
+            let mut seen = Ok(());
+            let mut look = |_, _| {
+                if seen.is_ok() {
+                    seen = observer.look();
+                }
+            };
+            let played = conductor.play_instant(&supervisor.host, &mut look, &mut lives);
+            seen?;
+            match played {
                 Ok(()) => {}
                 // Everything has been said: a run without a referee ends so.
                 Err(Discord::Over { .. })
@@ -153,6 +168,7 @@ fn play(
             }
         }
         next_glance = clock::monotonic().after(GLANCE);
+        observer.tick(clock::monotonic())?;
         supervisor.tick();
         monitor.update(supervisor);
         display.show(supervisor, monitor);

@@ -2,9 +2,11 @@
 
 mod cli;
 mod commands;
+mod compare;
 mod conductor;
 mod control;
 mod detach;
+mod experiment;
 mod graph;
 mod lockstep;
 mod monitor;
@@ -29,8 +31,14 @@ fn main() -> ExitCode {
         Command::Logs(args) => commands::finish(commands::logs(&args)),
         Command::Restart(args) => commands::finish(commands::restart(&args)),
         Command::Stop(args) => commands::finish(commands::stop(&args)),
+        Command::Experiment(args) => experiment::command(&args),
         Command::Graph(args) => graph::graph_command(&args.which.request(None), args.dot),
         Command::Order(args) => commands::finish(commands::order(&args)),
+        Command::Digest { file, json } => commands::finish(compare::digest(&file, json)),
+        Command::Diff { a, b, json } => match compare::diff(&a, &b, json) {
+            Ok(code) => code,
+            Err(error) => commands::finish(Err(error)),
+        },
         Command::Completions { shell } => {
             cli::print_completions(shell);
             ExitCode::SUCCESS
@@ -53,7 +61,12 @@ fn up_command(args: &UpArgs) -> ExitCode {
     let options = up::Options { board: args.board.clone(), logs: args.log_dir.clone(), json: args.json };
     let mut lines = plain::Lines::new(args.no_view);
     if args.lockstep {
-        let pace = lockstep::Pace { speed: args.speed, until_s: args.until, cpu: args.cpu };
+        let pace = lockstep::Pace {
+            speed: args.speed,
+            until_s: args.until,
+            cpu: args.cpu,
+            record: args.record.clone(),
+        };
         return lockstep::up(&graph, &options, &pace, &mut lines);
     }
     let on_terminal = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();

@@ -1,15 +1,17 @@
-//! Every message of a run in logical time, seen once: for the digest, and for the referee's word.
+//! Every message of a run in logical time, seen once: for the digest, the recording, and the referee's word.
 
-use blake3::Hasher;
 use board::JoinError;
+use board::manifest::Manifest;
 use board::tap::{Tap, TapReader};
-use messages::{RunState, RunSummary, View};
-use serde::Serialize;
-use std::collections::BTreeMap;
+use messages::{RunState, RunSummary, Time, View};
+use recording::{Digest, Digester, Envelope, Recorder};
+use std::path::Path;
 
 /// Reads every topic after every round.
 pub(crate) struct Observer {
     readers: Vec<Watched>,
+    digester: Digester,
+    recorder: Option<Recorder>,
     finish: Option<String>,
     summary: Option<RunSummary>,
     /// Kept until the end: dropping it gives the place on the board back.
@@ -19,53 +21,76 @@ pub(crate) struct Observer {
 struct Watched {
     topic: String,
     reader: TapReader,
-    hasher: Hasher,
-    count: u64,
 }
 
-/// A hash over all messages of a run in their order: equal for equal runs.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub(crate) struct Digest {
-    /// Over all topics.
-    pub(crate) digest: String,
-    /// Messages in all.
-    pub(crate) messages: u64,
-    /// Topic by topic: count and hash.
-    pub(crate) topics: BTreeMap<String, (u64, String)>,
+/// Why a run cannot be observed.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum ObserverError {
+    /// The board.
+    #[error(transparent)]
+    Join(#[from] JoinError),
+    /// The recording.
+    #[error(transparent)]
+    Recording(#[from] recording::RecordingError),
 }
 
 impl Observer {
-    /// Joins the board and reads every topic but the health of the services, which speaks of the machine.
+    /// Joins the board and reads every topic but the health of the services, which speaks of the machine; records them if there is a file.
     ///
     /// # Errors
-    /// When the board takes no more readers.
-    pub(crate) fn new(tap: Tap, finish: Option<&str>) -> Result<Self, JoinError> {
-        let names: Vec<String> = tap.manifest().topics.iter().map(|topic| topic.name.clone()).collect();
-        let mut readers = Vec::with_capacity(names.len());
-        for topic in names.into_iter().filter(|name| !name.starts_with("health/")) {
-            let reader = tap.reader(&topic)?;
-            readers.push(Watched { topic, reader, hasher: Hasher::new(), count: 0 });
+    /// When the board takes no more readers, or the file cannot be written.
+    pub(crate) fn new(tap: Tap, finish: Option<&str>, file: Option<&Path>) -> Result<Self, ObserverError> {
+        let contents = of_a_run(tap.manifest());
+        let mut readers = Vec::with_capacity(contents.topics.len());
+        for topic in &contents.topics {
+            readers.push(Watched { topic: topic.name.clone(), reader: tap.reader(&topic.name)? });
         }
-        Ok(Self { readers, finish: finish.map(str::to_owned), summary: None, _tap: tap })
+        let digester = Digester::new(contents.topics.iter().map(|topic| topic.name.as_str()));
+        let recorder = file.map(|file| Recorder::new(file, &contents)).transpose()?;
+        Ok(Self { readers, digester, recorder, finish: finish.map(str::to_owned), summary: None, _tap: tap })
     }
 
     /// Takes in what this round has brought.
-    pub(crate) fn look(&mut self) {
-        for watched in &mut self.readers {
+    ///
+    /// # Errors
+    /// When the recording cannot be written.
+    pub(crate) fn look(&mut self) -> Result<(), recording::RecordingError> {
+        for (index, watched) in self.readers.iter_mut().enumerate() {
             while let Some((envelope, bytes)) = watched.reader.next() {
-                watched.count += 1;
-                let mut head = [0; 28];
-                head[..8].copy_from_slice(&envelope.stamp_ns.to_le_bytes());
-                head[8..16].copy_from_slice(&envelope.origin_ns.to_le_bytes());
-                head[16..24].copy_from_slice(&envelope.sequence.to_le_bytes());
-                head[24..].copy_from_slice(&envelope.round.to_le_bytes());
-                watched.hasher.update(&head).update(bytes);
+                let envelope = Envelope {
+                    stamp_ns: envelope.stamp_ns,
+                    origin_ns: envelope.origin_ns,
+                    sequence: envelope.sequence,
+                    generation: envelope.generation,
+                    round: envelope.round,
+                };
+                self.digester.add(index, &envelope, bytes);
+                if let Some(recorder) = &mut self.recorder {
+                    recorder.record(index, &envelope, bytes)?;
+                }
                 if self.finish.as_ref() == Some(&watched.topic) {
                     self.summary =
                         View::<RunSummary>::parse(bytes).ok().map(|view| *view.message).or(self.summary);
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Lets the recording close what is old enough, so that little is lost if this process is killed.
+    ///
+    /// # Errors
+    /// When the recording cannot be written.
+    pub(crate) fn tick(&mut self, host_time: Time) -> Result<(), recording::RecordingError> {
+        self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.tick(host_time))
+    }
+
+    /// Ends the recording.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(crate) fn finish(&mut self) -> Result<(), recording::RecordingError> {
+        self.recorder.take().map_or(Ok(()), |recorder| recorder.finish().map(|_| ()))
     }
 
     /// The referee's last word.
@@ -81,19 +106,24 @@ impl Observer {
 
     /// The digest of what was seen so far.
     pub(crate) fn digest(&self) -> Digest {
-        let mut whole = Hasher::new();
-        let mut topics = BTreeMap::new();
-        for watched in &self.readers {
-            let hash = watched.hasher.finalize();
-            whole.update(watched.topic.as_bytes()).update(hash.as_bytes());
-            topics.insert(watched.topic.clone(), (watched.count, short(&hash)));
-        }
-        let messages = self.readers.iter().map(|watched| watched.count).sum();
-        Digest { digest: short(&whole.finalize()), messages, topics }
+        self.digester.digest()
     }
 }
 
-/// 128 bits are enough to tell runs apart, and fit on a line.
-fn short(hash: &blake3::Hash) -> String {
-    hash.to_hex().chars().take(32).collect()
+/// The topics of a run as a recording lists them.
+fn of_a_run(manifest: &Manifest) -> recording::Manifest {
+    let topics = manifest.topics.iter().filter(|topic| !topic.name.starts_with("health/"));
+    recording::Manifest {
+        graph: manifest.graph.clone(),
+        seed: manifest.seed,
+        topics: topics
+            .map(|topic| recording::Topic {
+                name: topic.name.clone(),
+                publisher: topic.publisher.clone(),
+                depth: topic.depth,
+                message: topic.message.clone(),
+            })
+            .collect(),
+        notes: std::collections::BTreeMap::new(),
+    }
 }

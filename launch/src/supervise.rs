@@ -492,13 +492,6 @@ impl Supervisor {
     }
 }
 
-impl Supervised {
-    /// When the present process began.
-    pub(crate) fn started(&self) -> Option<Time> {
-        self.process.as_ref().map(|process| process.started)
-    }
-}
-
 fn signal(process: &Process, signal: Signal) {
     let _ = kill_process(Pid::from_child(&process.child), signal);
 }

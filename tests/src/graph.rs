@@ -1,7 +1,7 @@
 //! A graph that is about to be started.
 
 use crate::running::Running;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A graph file and what is changed about it.
@@ -56,8 +56,20 @@ impl Graph {
     /// # Panics
     /// When it does not start, with the launcher's words.
     pub fn start(self) -> Running {
+        Running::start(&self.file, &Self::board_name(), &self.arguments)
+    }
+
+    /// A board that no other test has.
+    pub(crate) fn board_name() -> String {
         static COUNT: AtomicU32 = AtomicU32::new(0);
-        let board = format!("t{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
-        Running::start(&self.file, &board, &self.arguments)
+        format!("t{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
+    }
+
+    pub(crate) fn file(&self) -> &Path {
+        &self.file
+    }
+
+    pub(crate) fn arguments(&self) -> &[String] {
+        &self.arguments
     }
 }

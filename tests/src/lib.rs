@@ -13,6 +13,7 @@
 
 mod binaries;
 mod graph;
+mod logical;
 mod running;
 
 pub use binaries::{build, launcher};

@@ -4,10 +4,11 @@ use crate::binaries::launcher;
 use board::clock;
 use board::place::Place;
 use board::switchboard::SlotState;
-use board::tap::{Tap, TapReader};
+use board::tap::{Tap, TapPublisher, TapReader};
 use messages::{Message, View};
 use serde_json::Value;
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::Ordering;
@@ -18,6 +19,8 @@ pub struct Running {
     board: String,
     place: Place,
     launcher: RefCell<Child>,
+    /// One a topic: a board takes few publishers beside the rightful one.
+    publishers: RefCell<BTreeMap<String, TapPublisher>>,
     tap: RefCell<Option<Tap>>,
     output: PathBuf,
 }
@@ -50,6 +53,7 @@ impl Running {
             board: board.to_owned(),
             place,
             launcher: RefCell::new(launcher),
+            publishers: RefCell::new(BTreeMap::new()),
             tap: RefCell::new(None),
             output,
         };
@@ -107,10 +111,13 @@ impl Running {
 
     /// Publishes bytes, whatever they are, in the name of whoever publishes the topic.
     pub fn publish_bytes(&self, topic: &str, bytes: &[u8]) {
-        self.with_tap(|tap| {
-            let publisher = tap.publisher(topic).unwrap_or_else(|error| panic!("{error}"));
-            publisher.publish(bytes).unwrap_or_else(|error| panic!("{error}"));
+        let mut publishers = self.publishers.borrow_mut();
+        let publisher = publishers.entry(topic.to_owned()).or_insert_with(|| {
+            self.with_tap(|tap| {
+                tap.publisher(topic).unwrap_or_else(|error| panic!("{error}\n{}", self.output()))
+            })
         });
+        publisher.publish(bytes).unwrap_or_else(|error| panic!("{error}\n{}", self.output()));
     }
 
     /// Waits until a message on the topic, as JSON, meets the condition, and returns it.
@@ -158,6 +165,17 @@ impl Running {
             pid != 0
         });
         pid
+    }
+
+    /// Every service with its process.
+    pub fn services(&self) -> Vec<(String, u32)> {
+        let roles = self.with_tap(|tap| tap.manifest().services.clone());
+        roles.into_iter().map(|role| (role.clone(), self.pid(&role))).collect()
+    }
+
+    /// The launcher's process.
+    pub fn launcher_pid(&self) -> u32 {
+        self.launcher.borrow().id()
     }
 
     /// Kills a service (signal 9) and returns the moment.
@@ -229,6 +247,7 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
+        self.publishers.borrow_mut().clear();
         self.tap.borrow_mut().take();
         if self.exited().is_none() {
             signal(self.launcher.borrow().id(), "TERM");

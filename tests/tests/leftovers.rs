@@ -1,5 +1,7 @@
 //! Nothing of a board stays behind, however it ends.
 
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
+
 use board::clock;
 use board::place::Place;
 use std::process::Command;
@@ -12,7 +14,8 @@ fn waiting_robot() -> Graph {
 
 /// Files of the board in shared memory, in its folder and beside it.
 fn remains(place: &Place) -> Vec<String> {
-    let mut remains: Vec<String> = place.shared_memory().iter().map(|path| path.display().to_string()).collect();
+    let mut remains: Vec<String> =
+        place.shared_memory().iter().map(|path| path.display().to_string()).collect();
     if place.exists() {
         remains.push(place.root().display().to_string());
     }
@@ -59,8 +62,9 @@ fn the_services_leave_when_the_launcher_is_killed_and_the_next_command_cleans_up
 fn after_everything_was_killed_at_once() {
     let graph = waiting_robot().start();
     let place = graph.place().clone();
-    let pids: Vec<u32> =
-        ["base-driver", "controller", "simulator", "navigator", "planner"].map(|role| graph.pid(role)).to_vec();
+    let pids: Vec<u32> = ["base-driver", "controller", "simulator", "navigator", "planner"]
+        .map(|role| graph.pid(role))
+        .to_vec();
     graph.kill_launcher();
     pids.iter().for_each(|&pid| signal(pid, "KILL"));
     let output = Command::new(launcher()).arg("ps").output().unwrap();

@@ -14,12 +14,12 @@ use std::time::Duration;
 pub(crate) fn host_process() -> ExitCode {
     let name = std::env::args().nth(1).expect("a board's name");
     let host = Host::create(&name, manifest(&[("count", "counter")]), false).expect("a board");
+    let mut services = Vec::new();
     for which in ["counter", "stuck"] {
         let slot = host.prepare(which, true).expect("a free place");
-        itself(which)
-            .args(["--board", &name, "--slot", &slot.to_string()])
-            .spawn()
-            .expect("the test binary starts itself");
+        let mut command = itself(which);
+        command.args(["--board", &name, "--slot", &slot.to_string()]);
+        services.push(command.spawn().expect("the test binary starts itself"));
         let entry = host.switchboard().slot(slot).expect("a place");
         wait_for("the service to run", || entry.state() == SlotState::Running);
         wait_for("its step", || entry.heartbeat_ns.load(Ordering::Relaxed) > 0);

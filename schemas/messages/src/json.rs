@@ -29,6 +29,13 @@ pub enum JsonError {
     },
 }
 
+impl Kind {
+    /// The value in these bytes as JSON; null when there are too few.
+    pub fn to_json(&self, bytes: &[u8]) -> Value {
+        bytes.get(..self.size()).map_or(Value::Null, |part| value_to_json(self, part))
+    }
+}
+
 impl Description {
     /// The message in these bytes as JSON, field by field. Bytes that are missing show as null; NaN and infinities as texts.
     pub fn to_json(&self, bytes: &[u8]) -> Value {

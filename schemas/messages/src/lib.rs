@@ -7,10 +7,12 @@
 // The derive writes `::messages::..`, also for the messages of this very crate.
 extern crate self as messages;
 
+mod catalogue;
 mod json;
 mod kind;
 mod message;
 mod params;
+pub mod ros2msg;
 mod text;
 mod time;
 
@@ -29,6 +31,7 @@ mod world;
 #[cfg(test)]
 mod tests;
 
+pub use catalogue::catalogue;
 pub use coffee::*;
 pub use drive::*;
 pub use elevator::*;

@@ -80,3 +80,79 @@ pub struct TruePose {
     /// 1 with the last message of a log, 0 before.
     pub is_last: u32,
 }
+
+/// How many places a particle cloud names.
+pub const CLUSTER_CAPACITY: usize = 8;
+
+/// A place where the robot may be: a group of particles that hang together.
+#[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
+#[repr(C)]
+pub struct PoseCluster {
+    /// Mean place in the map.
+    pub x_m: f64,
+    /// Mean place in the map.
+    pub y_m: f64,
+    /// Mean heading in the map.
+    pub heading_rad: f64,
+    /// Standard deviation of the place.
+    pub sigma_m: f64,
+    /// Standard deviation of the heading.
+    pub sigma_rad: f64,
+    /// Its part of the whole weight, 0 to 1.
+    pub share: f64,
+}
+
+/// One particle.
+#[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
+#[repr(C)]
+pub struct Particle {
+    /// Place from the cloud's origin, along the map's x axis.
+    pub x_m: f32,
+    /// Place from the cloud's origin, along the map's y axis.
+    pub y_m: f32,
+    /// Heading in the map.
+    pub heading_rad: f32,
+    /// Its part of the weight of all particles, relative to the mean: 1 when all weigh the same.
+    pub weight: f32,
+}
+
+/// What a particle localiser believes, for viewing: the header, then a selection of its particles. Published by `particle-localiser`, at
+/// most every so often, on `location/particles`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
+#[message(element = Particle)]
+#[repr(C)]
+pub struct ParticleCloud {
+    /// Place in the map from which the particles' places are counted.
+    pub origin_x_m: f64,
+    /// Place in the map from which the particles' places are counted.
+    pub origin_y_m: f64,
+    /// Effective sample size, 1 to `count`, when the last scan had been weighed.
+    pub effective_count: f64,
+    /// How well the last scan fits the belief, 0 to 1.
+    pub fit: f64,
+    /// Places where the robot may be, the likeliest first; the first `cluster_count` are valid.
+    pub clusters: [PoseCluster; CLUSTER_CAPACITY],
+    /// Particles of the localiser, of which the elements are a selection.
+    pub count: u32,
+    /// Particles that the belief needs; more than `count` where the bound of the update or the parameters lowered it.
+    pub wanted_count: u32,
+    /// Valid entries of `clusters`.
+    pub cluster_count: u32,
+    /// All places, also those that are not in `clusters`.
+    pub clusters_in_all: u32,
+    /// Passes over the last scan.
+    pub passes: u32,
+    /// 1 when the bound of the update lowered the number of particles or passes, else 0.
+    pub limited: u32,
+    /// Particles scattered anew after the last scan.
+    pub scattered: u32,
+    /// Beams used of the last scan.
+    pub beams: u32,
+}
+
+impl ParticleCloud {
+    /// The places named, whatever the count claims.
+    pub fn places(&self) -> &[PoseCluster] {
+        &self.clusters[..(self.cluster_count as usize).min(CLUSTER_CAPACITY)]
+    }
+}

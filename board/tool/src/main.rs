@@ -8,6 +8,8 @@ mod info;
 mod list;
 mod publish;
 mod rate;
+mod record;
+mod replay;
 mod show;
 
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
@@ -66,6 +68,16 @@ enum Verb {
         after_help = "Examples:\n  board publish mission/order '{\"office\": 7}'\n  board publish wheels/desired '{}' --rate 20 -n 100 --force\n  board publish safety/clearance --raw random --seed 7 -n 1000 --rate 500\n  board publish laser/scan --raw @scan.bin\n\nFields that are not given are zero. `--raw` publishes bytes as they are, whatever they mean, and so needs no --force."
     )]
     Publish(publish::Options),
+    /// Record messages into a file that also the tools of ROS 2 and Foxglove read; until Ctrl-C, or until the board goes down.
+    #[command(
+        after_help = "Examples:\n  board record -o drive.mcap\n  board record 'tof/*' wheels/applied -o short.mcap --duration 10"
+    )]
+    Record(record::Options),
+    /// Publish the messages of a recording, in the name of those who published them.
+    #[command(
+        after_help = "Examples:\n  board replay drive.mcap --topics 'tof/*',tag/ranges\n  board replay drive.mcap --speed 10 --loop"
+    )]
+    Replay(replay::Options),
     /// Clear away boards whose launcher is gone, and what the dead have left on boards that are up.
     #[command(after_help = "Example:\n  board clean")]
     Clean,
@@ -98,6 +110,8 @@ fn main() -> ExitCode {
         Verb::Rate(options) => rate::run(common, options),
         Verb::Delay(options) => rate::run_delay(common, options),
         Verb::Publish(options) => publish::run(common, options),
+        Verb::Record(options) => record::run(common, options),
+        Verb::Replay(options) => replay::run(common, options),
         Verb::Clean => clean::run(common),
         Verb::Doctor => doctor::run(common),
         Verb::Completions { shell } => {

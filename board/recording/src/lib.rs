@@ -1,0 +1,180 @@
+//! Recordings: every message of a board, written while it runs and read back to the byte.
+//!
+//! A recording is an MCAP file (<https://mcap.dev/spec>) of profile `ros2`: each topic a channel of encoding `cdr` with a generated
+//! `ros2msg` schema, so that the tools of ROS 2 and Foxglove read it. What they do not know lies beside it where they do not look: the table of
+//! contents with the descriptions of all messages as metadata, and the rest of the envelope in private records (see [`mod@format`]). The
+//! crate knows neither the board nor the clock: moments come in as arguments.
+
+pub mod format;
+
+mod cdr;
+mod compare;
+mod read;
+mod write;
+
+#[cfg(test)]
+mod tests;
+
+pub use cdr::{Codec, InvalidDescription, Misfit};
+pub use compare::{Difference, Digest, Digester, first_difference};
+pub use read::{Message, Messages, Recording};
+pub use write::{Counts, Recorder};
+
+/// The note that says when the recording began, in nanoseconds of the board's clock: older messages lay on the board already.
+pub const BEGIN_NOTE: &str = "begin_ns";
+/// The note that says how many messages were lost, as a JSON object by topic.
+pub const LOST_NOTE: &str = "lost";
+
+use messages::Description;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// One topic of a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Topic {
+    /// Its name.
+    pub name: String,
+    /// The service that published it; `None` when messages came from outside.
+    pub publisher: Option<String>,
+    /// How many messages could wait for a reader.
+    pub depth: usize,
+    /// The type of its messages.
+    pub message: Description,
+}
+
+/// What a recording is of: enough to build the board's topics again, and to show every message, without knowing a single type.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, Default)]
+pub struct Manifest {
+    /// The graph that ran.
+    pub graph: String,
+    /// Its seed.
+    pub seed: u64,
+    /// The topics; a message names its topic by the place in this list.
+    pub topics: Vec<Topic>,
+    /// Whatever else is worth keeping: the graph file's text, when it was recorded, messages lost.
+    #[serde(default)]
+    pub notes: BTreeMap<String, String>,
+}
+
+impl Manifest {
+    /// The place and the entry of a topic.
+    pub fn topic(&self, name: &str) -> Option<(usize, &Topic)> {
+        self.topics.iter().enumerate().find(|(_, topic)| topic.name == name)
+    }
+}
+
+/// What lies in front of every message on the board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Envelope {
+    /// When it was published, in nanoseconds of the board's clock.
+    pub stamp_ns: u64,
+    /// When the oldest sensor reading behind it was taken.
+    pub origin_ns: u64,
+    /// The publisher's count of messages on this topic.
+    pub sequence: u64,
+    /// Which start of which publisher.
+    pub generation: u32,
+    /// The round within the logical instant, in lockstep.
+    pub round: u32,
+}
+
+/// Why a recording cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// The file system.
+    #[error("{}: {cause}", path.display())]
+    Io {
+        /// The recording.
+        path: PathBuf,
+        /// What the system says.
+        #[source]
+        cause: std::io::Error,
+    },
+    /// The file is MCAP, and broken, or cannot be written as MCAP.
+    #[error("{}: {cause}", path.display())]
+    Mcap {
+        /// The recording.
+        path: PathBuf,
+        /// What is wrong.
+        #[source]
+        cause: Box<mcap::McapError>,
+    },
+    /// The file is something else, or was cut before its table of contents.
+    #[error("{} is no recording: {why}", path.display())]
+    NotARecording {
+        /// The file.
+        path: PathBuf,
+        /// How that is known.
+        why: String,
+    },
+    /// A message type that cannot be laid out.
+    #[error("{}: topic `{topic}`: {cause}", path.display())]
+    Description {
+        /// The recording.
+        path: PathBuf,
+        /// The topic.
+        topic: String,
+        /// What is wrong with it.
+        #[source]
+        cause: InvalidDescription,
+    },
+    /// A message that is not what its topic says.
+    #[error("{}: topic `{topic}`: the message {sequence} has {bytes} bytes, which are no `{message}`", path.display())]
+    Misfit {
+        /// The recording.
+        path: PathBuf,
+        /// The topic.
+        topic: String,
+        /// The type it should be.
+        message: String,
+        /// Which message.
+        sequence: u64,
+        /// Its bytes.
+        bytes: usize,
+    },
+    /// A topic number that is not in the manifest.
+    #[error("{}: there is no topic {index}; the recording has {topics}", path.display())]
+    NoTopic {
+        /// The recording.
+        path: PathBuf,
+        /// The number given.
+        index: usize,
+        /// How many there are.
+        topics: usize,
+    },
+    /// More topics than the format can number.
+    #[error("{}: {topics} topics; a recording holds {}", path.display(), u16::MAX)]
+    TooManyTopics {
+        /// The recording.
+        path: PathBuf,
+        /// How many.
+        topics: usize,
+    },
+}
+
+impl RecordingError {
+    fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |cause| Self::Io { path, cause }
+    }
+
+    fn mcap(path: &Path) -> impl FnOnce(mcap::McapError) -> Self {
+        let path = path.to_owned();
+        move |cause| match cause {
+            mcap::McapError::Io(cause) => Self::Io { path, cause },
+            cause => Self::Mcap { path, cause: Box::new(cause) },
+        }
+    }
+}
+
+fn codecs(path: &Path, manifest: &Manifest) -> Result<Vec<Codec>, RecordingError> {
+    let codec = |topic: &Topic| {
+        Codec::new(&topic.message).map_err(|cause| RecordingError::Description {
+            path: path.to_owned(),
+            topic: topic.name.clone(),
+            cause,
+        })
+    };
+    manifest.topics.iter().map(codec).collect()
+}

@@ -1,0 +1,202 @@
+//! `board replay`: a recording onto a running board.
+
+use crate::connect::{self, Life, publisher_life};
+use crate::{Common, Outcome, show};
+use board::clock;
+use board::tap::{Tap, TapPublisher};
+use recording::Recording;
+use serde_json::json;
+use std::error::Error;
+use std::io::{self, IsTerminal as _, Write as _};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// The recording.
+    #[arg(value_name = "FILE.mcap")]
+    file: PathBuf,
+    /// These topics only; `subject/*` for all of a subject [default: all that the board has]
+    #[arg(long, value_name = "TOPIC", value_delimiter = ',')]
+    topics: Vec<String>,
+    /// How many times as fast, or `max`.
+    #[arg(long, value_name = "X", default_value = "1", value_parser = speed)]
+    speed: f64,
+    /// Begin again at the end, until Ctrl-C.
+    #[arg(long = "loop")]
+    repeat: bool,
+    /// Publish beside services that publish these topics.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Readers find a publisher when they next look, and get nothing from one that has left before.
+const LINGER: Duration = Duration::from_millis(300);
+/// Longest sleep: how soon an interrupt is noticed.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// Why a recording is not replayed.
+#[derive(Debug, thiserror::Error)]
+enum ReplayError {
+    #[error("{file} has no topic `{topic}`; it has {known}")]
+    NotRecorded { file: String, topic: String, known: String },
+    #[error("the board has none of the topics of {file}: {topics}")]
+    NothingInCommon { file: String, topics: String },
+    #[error("topic `{topic}` was recorded with another layout: {difference}")]
+    Layout { topic: String, difference: String },
+    #[error(
+        "living services publish {}; the recording would mix with their messages, and whoever obeys them might move. \
+         Stop them, choose other topics with --topics, or say --force to publish beside them",
+        topics.join(", ")
+    )]
+    Alive { topics: Vec<String> },
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        _ if text == "max" => Ok(f64::INFINITY),
+        Ok(speed) if speed > 0.0 => Ok(speed),
+        _ => Err("a number above zero, or `max`".to_owned()),
+    }
+}
+
+pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
+    let interrupted = connect::interrupted()?;
+    let recording = Recording::open(&options.file)?;
+    let mut tap = connect::join(common)?;
+    let publishers = publishers(&recording, &mut tap, options)?;
+    if !recording.is_complete() {
+        eprintln!("{} was cut; it is replayed up to its last whole chunk", options.file.display());
+    }
+    // Readers that were there before us find us first.
+    linger(&tap, &interrupted);
+    let mut published = 0;
+    let mut damaged = 0;
+    loop {
+        let (messages, errors) = play(&recording, &tap, &publishers, common, options, &interrupted)?;
+        published += messages;
+        damaged += errors;
+        if !options.repeat || messages == 0 || interrupted.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    linger(&tap, &interrupted);
+    if common.json {
+        show::json(&json!({ "file": options.file, "published": published, "damaged_chunks": damaged }))?;
+    } else {
+        let topics = publishers.iter().flatten().count();
+        show::line(&format!("published {published} messages on {topics} topics"))?;
+    }
+    Ok(if damaged > 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// A publisher for each topic of the recording that is replayed.
+fn publishers(
+    recording: &Recording,
+    tap: &mut Tap,
+    options: &Options,
+) -> Result<Vec<Option<TapPublisher>>, Box<dyn Error>> {
+    let file = options.file.display().to_string();
+    let matches = |pattern: &str, name: &str| match pattern.strip_suffix('*') {
+        Some(subject) => name.starts_with(subject),
+        None => pattern == name,
+    };
+    let known =
+        || recording.topics().iter().map(|topic| format!("`{}`", topic.name)).collect::<Vec<_>>().join(", ");
+    for pattern in &options.topics {
+        if !recording.topics().iter().any(|topic| matches(pattern, &topic.name)) {
+            return Err(ReplayError::NotRecorded { file, topic: pattern.clone(), known: known() }.into());
+        }
+    }
+    let mut names = Vec::new();
+    let mut alive = Vec::new();
+    for topic in recording.topics() {
+        let wanted = if options.topics.is_empty() {
+            !topic.name.starts_with("health/")
+        } else {
+            options.topics.iter().any(|pattern| matches(pattern, &topic.name))
+        };
+        let found = tap.manifest().topic(&topic.name).filter(|_| wanted);
+        if let Some((index, here)) = found {
+            if let Some(difference) = topic.message.first_difference(&here.message) {
+                return Err(ReplayError::Layout { topic: topic.name.clone(), difference }.into());
+            }
+            if let Some(publisher) = &here.publisher
+                && publisher_life(tap.switchboard(), index) == Life::Lives
+            {
+                alive.push(format!("`{}` (`{publisher}`)", topic.name));
+            }
+        }
+        names.push(found.map(|_| topic.name.clone()));
+    }
+    if names.iter().all(Option::is_none) {
+        return Err(ReplayError::NothingInCommon { file, topics: known() }.into());
+    }
+    if !alive.is_empty() && !options.force {
+        return Err(ReplayError::Alive { topics: alive }.into());
+    }
+    let open = |name: Option<String>| name.map(|name| tap.publisher(&name)).transpose();
+    Ok(names.into_iter().map(open).collect::<Result<_, _>>()?)
+}
+
+/// Once through the recording: messages published, and chunks that could not be read.
+fn play(
+    recording: &Recording,
+    tap: &Tap,
+    publishers: &[Option<TapPublisher>],
+    common: &Common,
+    options: &Options,
+    interrupted: &AtomicBool,
+) -> Result<(u64, u64), Box<dyn Error>> {
+    let shows = io::stderr().is_terminal() && !common.json;
+    // What lay on the board when the recording began is published at once, however old it was.
+    let mut first_ns =
+        recording.manifest().notes.get(recording::BEGIN_NOTE).and_then(|text| text.parse().ok());
+    let begin = clock::monotonic();
+    let mut shown = begin;
+    let (mut published, mut damaged) = (0, 0);
+    let names: Vec<bool> = publishers.iter().map(Option::is_some).collect();
+    let wanted = |name: &str| recording.manifest().topic(name).is_some_and(|(index, _)| names[index]);
+    for message in recording.in_order(|topic| wanted(&topic.name)) {
+        let message = match message {
+            Ok(message) => message,
+            Err(error) => {
+                eprintln!("{error}");
+                damaged += 1;
+                continue;
+            }
+        };
+        let stamp_ns = message.envelope.stamp_ns;
+        let passed_ns = stamp_ns.saturating_sub(*first_ns.get_or_insert(stamp_ns));
+        let due = begin.after(Duration::from_nanos((passed_ns as f64 / options.speed) as u64));
+        let mut now = clock::monotonic();
+        while now < due && !interrupted.load(Ordering::Relaxed) {
+            tap.wait(tap.bell(), due.since(now).min(LOOK));
+            now = clock::monotonic();
+        }
+        if interrupted.load(Ordering::Relaxed) {
+            break;
+        }
+        if let Some(publisher) = &publishers[message.topic] {
+            publisher.publish(message.bytes())?;
+            published += 1;
+        }
+        if shows && now.since(shown) >= LOOK {
+            shown = now;
+            let _ = write!(io::stderr(), "\r\x1b[K{:.1} s: {published} messages", passed_ns as f64 * 1e-9);
+        }
+    }
+    if shows {
+        let _ = write!(io::stderr(), "\r\x1b[K");
+    }
+    Ok((published, damaged))
+}
+
+fn linger(tap: &Tap, interrupted: &AtomicBool) {
+    let until = clock::monotonic().after(LINGER);
+    while clock::monotonic() < until && !interrupted.load(Ordering::Relaxed) {
+        tap.wait(tap.bell(), until.since(clock::monotonic()));
+    }
+}

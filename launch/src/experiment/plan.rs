@@ -1,0 +1,377 @@
+//! From an experiment file to its runs.
+
+use crate::graph::Overrides;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// More runs than this are a slip in the file.
+const RUNS_MAX: usize = 100_000;
+
+/// Why an experiment file is refused.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum PlanError {
+    /// The file cannot be read.
+    #[error("cannot read the experiment file {file}: {cause}")]
+    Unreadable {
+        /// The file.
+        file: String,
+        /// What the operating system said.
+        cause: std::io::Error,
+    },
+    /// The file is no experiment.
+    #[error("{file}: {cause}")]
+    Malformed {
+        /// The file.
+        file: String,
+        /// What is wrong, with its line.
+        cause: Box<toml::de::Error>,
+    },
+    /// Something to vary that is no list.
+    #[error("`{key}` takes a list of values, such as [{value}]")]
+    NotAList {
+        /// What varies.
+        key: String,
+        /// What is there instead.
+        value: String,
+    },
+    /// A list with nothing in it.
+    #[error("`{key}` is an empty list: give it a value, or remove it")]
+    EmptyList {
+        /// What varies.
+        key: String,
+    },
+    /// A binary that is not named by a text.
+    #[error("the role `{role}` takes a binary's name in quotes, not {value}")]
+    NotABinary {
+        /// The role.
+        role: String,
+        /// What is there instead.
+        value: String,
+    },
+    /// Two variants cannot be told apart.
+    #[error("two variants are called `{name}`: give each a name of its own")]
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// A variant's axis that the others do not have.
+    #[error("`{key}` is varied across in a variant, but not in the experiment: name it under [across] too")]
+    NotAnAxis {
+        /// The key.
+        key: String,
+    },
+    /// A limit that is none.
+    #[error("limit_s = {limit_s} is not above zero")]
+    NoLimit {
+        /// The limit.
+        limit_s: f64,
+    },
+    /// No seeds, or far too much to do.
+    #[error(
+        "this makes {runs} runs; between 1 and {RUNS_MAX} are possible: change the seeds or what is varied"
+    )]
+    Size {
+        /// How many.
+        runs: usize,
+    },
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    name: Option<String>,
+    graph: String,
+    limit_s: f64,
+    seeds: Seeds,
+    #[serde(default)]
+    worlds: Vec<String>,
+    #[serde(default)]
+    set: Table,
+    #[serde(default)]
+    swap: Table,
+    #[serde(default)]
+    without: Vec<String>,
+    #[serde(default)]
+    vary: Table,
+    #[serde(default)]
+    across: Table,
+    #[serde(default)]
+    variant: Vec<VariantTable>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct VariantTable {
+    name: String,
+    #[serde(default)]
+    set: Table,
+    #[serde(default)]
+    swap: Table,
+    #[serde(default)]
+    without: Vec<String>,
+    seeds: Option<Seeds>,
+    limit_s: Option<f64>,
+    /// Its own values of some of the situations' axes.
+    #[serde(default)]
+    across: Table,
+    #[serde(default)]
+    expect: BTreeMap<String, [f64; 2]>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(untagged, expecting = "seeds are { from = 1, count = 20 } or a list of numbers")]
+enum Seeds {
+    Range(SeedRange),
+    List(Vec<u64>),
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SeedRange {
+    from: u64,
+    count: u64,
+}
+
+impl Seeds {
+    fn list(&self) -> Vec<u64> {
+        match self {
+            Self::List(list) => list.clone(),
+            Self::Range(range) => {
+                let count = range.count.min(RUNS_MAX as u64 + 1);
+                (range.from..range.from.saturating_add(count)).collect()
+            }
+        }
+    }
+}
+
+/// An experiment, spelt out.
+#[derive(Debug, Clone)]
+pub(super) struct Plan {
+    pub(super) name: String,
+    /// A name or a path, as `launch up` takes it.
+    pub(super) graph: String,
+    pub(super) variants: Vec<Variant>,
+    /// What the situations differ in, the seed apart.
+    pub(super) axes: Vec<String>,
+    /// Variant by variant.
+    pub(super) runs: Vec<Run>,
+}
+
+/// What is compared with the others.
+#[derive(Debug, Clone)]
+pub(super) struct Variant {
+    pub(super) name: String,
+    /// Bounds of the mean of a figure, and of `passes`: the share of runs that pass.
+    pub(super) expect: BTreeMap<String, [f64; 2]>,
+}
+
+/// One run of one variant in one situation.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Run {
+    pub(super) variant: usize,
+    /// Parallel to the axes.
+    pub(super) situation: Vec<String>,
+    pub(super) seed: u64,
+    pub(super) limit_s: f64,
+    /// All that is different from the graph file, the seed included.
+    pub(super) overrides: Overrides,
+}
+
+/// Changes in a graph, and how people call them.
+#[derive(Debug, Clone, Default)]
+struct Changes {
+    labels: Vec<String>,
+    set: Vec<String>,
+    swap: Vec<String>,
+    without: Vec<String>,
+}
+
+impl Changes {
+    /// These, and over them others.
+    fn and(&self, more: &Self) -> Self {
+        let join = |one: &[String], other: &[String]| [one, other].concat();
+        Self {
+            labels: join(&self.labels, &more.labels),
+            set: join(&self.set, &more.set),
+            swap: join(&self.swap, &more.swap),
+            without: join(&self.without, &more.without),
+        }
+    }
+
+    fn of_tables(set: &Table, swap: &Table, without: &[String]) -> Result<Self, PlanError> {
+        let mut changes = Self { without: without.to_vec(), ..Self::default() };
+        for (key, value) in set {
+            match value {
+                // [set.role] with its parameters below reads as well as "role.parameter".
+                Value::Table(inner) if !key.contains('.') => {
+                    changes.set.extend(inner.iter().map(|(name, value)| format!("{key}.{name}={value}")));
+                }
+                value => changes.set.push(format!("{key}={value}")),
+            }
+        }
+        for (role, binary) in swap {
+            changes.swap.push(swapped(role, binary)?);
+        }
+        Ok(changes)
+    }
+
+    /// One value of an axis: a key with a dot is a parameter, one without is a role.
+    fn of_axis(key: &str, value: &Value) -> Result<Self, PlanError> {
+        let label = match value {
+            Value::String(text) => text.clone(),
+            other => other.to_string(),
+        };
+        let mut changes = Self { labels: vec![label], ..Self::default() };
+        if key.contains('.') {
+            changes.set.push(format!("{key}={value}"));
+        } else {
+            changes.swap.push(swapped(key, value)?);
+        }
+        Ok(changes)
+    }
+}
+
+fn swapped(role: &str, binary: &Value) -> Result<String, PlanError> {
+    match binary {
+        Value::String(binary) => Ok(format!("{role}={binary}")),
+        other => Err(PlanError::NotABinary { role: role.to_owned(), value: other.to_string() }),
+    }
+}
+
+/// Reads an experiment file.
+///
+/// # Errors
+/// Names what is wrong with it.
+pub(super) fn read(file: &Path) -> Result<Plan, PlanError> {
+    let shown = file.display().to_string();
+    let text = std::fs::read_to_string(file)
+        .map_err(|cause| PlanError::Unreadable { file: shown.clone(), cause })?;
+    let stem = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or("experiment");
+    parse(&text, stem, file.parent().unwrap_or(Path::new(""))).map_err(|error| match error {
+        PlanError::Malformed { cause, .. } => PlanError::Malformed { file: shown, cause },
+        other => other,
+    })
+}
+
+/// The same of a text; `folder` is that of the file.
+pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanError> {
+    let mut file: File = toml::from_str(text)
+        .map_err(|cause| PlanError::Malformed { file: stem.to_owned(), cause: Box::new(cause) })?;
+    if !file.worlds.is_empty() {
+        let worlds = file.worlds.iter().cloned().map(Value::String).collect();
+        file.across.insert("graph.defaults.world".to_owned(), Value::Array(worlds));
+    }
+    let for_all = Changes::of_tables(&file.set, &file.swap, &file.without)?;
+    let combinations = product(&file.vary)?;
+    if file.variant.is_empty() {
+        file.variant.push(VariantTable {
+            name: String::new(),
+            set: Table::new(),
+            swap: Table::new(),
+            without: Vec::new(),
+            seeds: None,
+            limit_s: None,
+            across: Table::new(),
+            expect: BTreeMap::new(),
+        });
+    }
+    let mut variants: Vec<Variant> = Vec::new();
+    let mut runs = Vec::new();
+    for table in &file.variant {
+        let own = Changes::of_tables(&table.set, &table.swap, &table.without)?;
+        let limit_s = table.limit_s.unwrap_or(file.limit_s);
+        if !(limit_s > 0.0 && limit_s.is_finite()) {
+            return Err(PlanError::NoLimit { limit_s });
+        }
+        let situations = product(&own_axes(&file.across, &table.across)?)?;
+        let seeds = table.seeds.as_ref().unwrap_or(&file.seeds).list();
+        let more = seeds.len().saturating_mul(situations.len()).saturating_mul(combinations.len());
+        if seeds.is_empty() || runs.len().saturating_add(more) > RUNS_MAX {
+            return Err(PlanError::Size { runs: runs.len().saturating_add(more) });
+        }
+        for combination in &combinations {
+            let name = variant_name(&table.name, &file.vary, &combination.labels);
+            if variants.iter().any(|known| known.name == name) {
+                return Err(PlanError::SameName { name });
+            }
+            variants.push(Variant { name, expect: table.expect.clone() });
+            let changes = for_all.and(&own).and(combination);
+            for situation in &situations {
+                let changes = changes.and(situation);
+                runs.extend(seeds.iter().map(|&seed| Run {
+                    variant: variants.len() - 1,
+                    situation: situation.labels.clone(),
+                    seed,
+                    limit_s,
+                    overrides: Overrides {
+                        set: changes.set.clone(),
+                        swap: changes.swap.clone(),
+                        without: changes.without.clone(),
+                        seed: Some(seed),
+                        board: None,
+                    },
+                }));
+            }
+        }
+    }
+    Ok(Plan {
+        name: file.name.unwrap_or_else(|| stem.to_owned()),
+        graph: located(&file.graph, folder),
+        variants,
+        axes: file.across.keys().cloned().collect(),
+        runs,
+    })
+}
+
+/// The axes of all, with a variant's own values for some of them.
+fn own_axes(all: &Table, own: &Table) -> Result<Table, PlanError> {
+    let mut axes = all.clone();
+    for (key, values) in own {
+        match axes.get_mut(key) {
+            Some(known) => *known = values.clone(),
+            None => return Err(PlanError::NotAnAxis { key: key.clone() }),
+        }
+    }
+    Ok(axes)
+}
+
+/// Every combination of the axes' values; one without changes if there are no axes.
+fn product(axes: &Table) -> Result<Vec<Changes>, PlanError> {
+    let mut combinations = vec![Changes::default()];
+    for (key, values) in axes {
+        let Value::Array(values) = values else {
+            return Err(PlanError::NotAList { key: key.clone(), value: values.to_string() });
+        };
+        if values.is_empty() {
+            return Err(PlanError::EmptyList { key: key.clone() });
+        }
+        let values = values.iter().map(|value| Changes::of_axis(key, value));
+        let values = values.collect::<Result<Vec<_>, _>>()?;
+        combinations =
+            combinations.iter().flat_map(|known| values.iter().map(|value| known.and(value))).collect();
+    }
+    Ok(combinations)
+}
+
+/// The name in the file, and what is varied beside it.
+fn variant_name(name: &str, axes: &Table, labels: &[String]) -> String {
+    let short = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
+    let varied = axes.keys().zip(labels).map(|(key, label)| match key.contains('.') {
+        true => format!("{}={label}", short(key)),
+        false => label.clone(),
+    });
+    let parts: Vec<String> =
+        Some(name.to_owned()).filter(|name| !name.is_empty()).into_iter().chain(varied).collect();
+    if parts.is_empty() { "as the graph is".to_owned() } else { parts.join(", ") }
+}
+
+/// A graph's path counts from the experiment's folder; a bare name is looked up.
+fn located(graph: &str, folder: &Path) -> String {
+    if !graph.contains('/') && !graph.ends_with(".toml") {
+        return graph.to_owned();
+    }
+    let path: PathBuf = folder.join(graph);
+    path.canonicalize().unwrap_or(path).display().to_string()
+}

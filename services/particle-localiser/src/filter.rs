@@ -1,0 +1,439 @@
+//! The filter itself: particles are moved, weighed, drawn anew and scattered. It knows no messages.
+//!
+//! Monte Carlo localisation (Fox et al. 1999) with these changes: one scan is taken in by several passes, each of which sharpens the
+//! belief only so far that enough particles stay effective (annealing, after Deutscher et al. 2000); the number of particles follows the
+//! belief (Fox 2003) and a bound of the work; a start without a pose, and the recovery of a robot that was carried away, search the whole
+//! map by the same passes.
+
+use crate::bins::{BinTable, Division};
+use crate::clusters::{Cluster, Finder};
+use crate::motion::{MotionSigma, Travel, advance};
+use crate::params::{Params, Start};
+use crate::recovery::Averages;
+use crate::resample::{comb, resample_clusters};
+use crate::{Beams, Map, Particles, Weigher, kld};
+use geometry::Pose2;
+
+/// What an update found.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Update {
+    /// Places where the robot may be, the likeliest first.
+    pub clusters: Vec<Cluster>,
+    /// Effective sample size after the last pass.
+    pub effective: f64,
+    /// How well the scan fitted the belief before it was used, 0 to 1.
+    pub fit: f64,
+    /// Passes over the scan.
+    pub passes: u32,
+    /// Particles that the belief needs.
+    pub wanted: usize,
+    /// Whether the bound of the work lowered the number of particles or passes.
+    pub limited: bool,
+    /// Particles scattered anew.
+    pub scattered: usize,
+    /// Beams used.
+    pub beams: usize,
+}
+
+/// Particles on a map.
+#[derive(Debug, Clone)]
+pub struct Filter {
+    params: Params,
+    map: Map,
+    weigher: Weigher,
+    division: Division,
+    seed: u64,
+    /// Counts what uses random numbers.
+    epoch: u64,
+    particles: Particles,
+    /// Where the next generation grows.
+    spare: Particles,
+    /// How far apart particles are that have been drawn more than once.
+    spread: MotionSigma,
+    averages: Averages,
+    /// Scans that are still to come in which the whole map is searched beside what has been found.
+    searches: u32,
+    finder: Finder,
+    bins: BinTable,
+    points: Vec<u32>,
+}
+
+/// The work that is left of a bound.
+#[derive(Debug, Clone, Copy)]
+struct Budget {
+    left: Option<u64>,
+    limited: bool,
+}
+
+impl Budget {
+    /// So many particles can be weighed by so many beams once.
+    fn affordable(&mut self, wanted: usize, beams: usize) -> usize {
+        let Some(left) = self.left else { return wanted };
+        let most = usize::try_from(left / beams.max(1) as u64).unwrap_or(usize::MAX);
+        self.limited |= most < wanted;
+        wanted.min(most)
+    }
+
+    fn spend(&mut self, particles: usize, beams: usize) {
+        if let Some(left) = &mut self.left {
+            *left = left.saturating_sub(particles as u64 * beams as u64);
+        }
+    }
+}
+
+/// However small the bound, this many particles are kept.
+const FEWEST: usize = 10;
+/// Candidates for each particle that is scattered to recover.
+const CANDIDATES: usize = 10;
+/// Weight of all scattered particles together, for each unit of their share.
+const SCATTERED_PRIOR: f64 = 0.001;
+/// From one pass to the next the spread shrinks to this.
+const SHRINK: f64 = 0.6;
+/// Directions at one place among scattered particles, which sets how far apart the places are.
+const DIRECTIONS: f64 = 16.0;
+
+impl Filter {
+    /// A filter that begins at the start of the parameters or, without one, everywhere. The parameters have been checked.
+    pub fn new(params: Params, map: Map, seed: u64) -> Self {
+        let weigher = Weigher::new(&params, &map);
+        let division = Division::new(params.bin_m, params.bin_rad);
+        let start = params.start;
+        let mut filter = Self {
+            params,
+            map,
+            weigher,
+            division,
+            seed,
+            epoch: 0,
+            particles: Particles::default(),
+            spare: Particles::default(),
+            spread: MotionSigma::default(),
+            averages: Averages::default(),
+            searches: 0,
+            finder: Finder::default(),
+            bins: BinTable::default(),
+            points: Vec::new(),
+        };
+        if let Some(start) = start {
+            filter.begin_at(&start);
+        }
+        filter
+    }
+
+    /// The particles, in the map's own frame.
+    pub fn particles(&self) -> &Particles {
+        &self.particles
+    }
+
+    /// The map.
+    pub fn map(&self) -> &Map {
+        &self.map
+    }
+
+    /// The measurement model.
+    pub fn weigher(&self) -> &Weigher {
+        &self.weigher
+    }
+
+    /// How well scans fit in the long run, 0 to 1.
+    pub fn usual_fit(&self) -> f64 {
+        self.averages.usual()
+    }
+
+    /// How well the last scans fitted, 0 to 1.
+    pub fn fit(&self) -> f64 {
+        self.averages.fit()
+    }
+
+    /// Forgets everything: the next scan searches the whole map.
+    pub fn forget(&mut self) {
+        self.particles.clear();
+        self.averages = Averages::default();
+    }
+
+    /// Begins anew around a pose in the frame of the map's file.
+    pub fn begin_at(&mut self, start: &Start) {
+        self.epoch += 1;
+        let centre = self.map.to_own(Pose2::new(start.x_m, start.y_m, start.heading_rad));
+        let count = self.params.max_particles as usize;
+        self.particles.clear();
+        for _ in 0..count {
+            self.particles.push([centre.x_m as f32, centre.y_m as f32, centre.heading_rad as f32]);
+        }
+        self.particles.level();
+        self.particles.jitter(self.seed, self.epoch, start.sigma_m as f32, start.sigma_rad as f32);
+        self.searches = 0;
+        self.spread = MotionSigma { place_m: 0.3 * start.sigma_m, heading_rad: 0.3 * start.sigma_rad };
+        self.averages = Averages::default();
+    }
+
+    /// Moves the particles by what was travelled since the last move.
+    pub fn advance(&mut self, travel: &Travel) {
+        self.epoch += 1;
+        let sigma = travel.sigma(&self.params.motion);
+        advance(&mut self.particles, travel, sigma, self.seed, self.epoch);
+        self.spread.place_m = self.spread.place_m.max(0.5 * sigma.place_m);
+        self.spread.heading_rad = self.spread.heading_rad.max(0.5 * sigma.heading_rad);
+    }
+
+    /// Takes in a scan. `None` when there is nothing to weigh, or nowhere to be.
+    pub fn correct(&mut self, beams: &Beams) -> Option<Update> {
+        if beams.is_empty() || self.map.is_empty() {
+            return None;
+        }
+        let bound = self.params.budget_particle_beams;
+        let mut budget = Budget { left: (bound > 0).then_some(bound), limited: false };
+        let from_nowhere = self.particles.is_empty();
+        if from_nowhere {
+            let wanted = self.params.global_particles as usize;
+            let count = budget.affordable(wanted, beams.len()).max(FEWEST);
+            let (particles, spread) = self.scatter(count, true);
+            (self.particles, self.spread) = (particles, spread);
+        }
+        let affordable = budget.affordable(self.particles.len(), beams.len()).max(FEWEST);
+        if affordable < self.particles.len() {
+            self.finder.find(&self.particles, self.division);
+            self.draw(affordable);
+        }
+        let mut particles = std::mem::take(&mut self.particles);
+        let mut spread = self.spread;
+        let passes = self.params.max_passes;
+        let done = self.anneal(&mut particles, beams, &mut spread, passes, &mut budget);
+        (self.particles, self.spread) = (particles, spread);
+        if from_nowhere {
+            self.level_clusters(beams);
+            self.searches = self.params.recovery.early_scans;
+        } else {
+            self.searches = self.searches.saturating_sub(1);
+        }
+        self.averages.add(done.fit, &self.params.recovery);
+        let clusters = self.finder.find(&self.particles, self.division);
+        let effective = self.particles.effective();
+        let wanted = self.wanted();
+        let scattered = self.renew(beams, effective, wanted, &mut budget);
+        Some(Update {
+            clusters,
+            effective,
+            fit: done.fit,
+            passes: done.passes,
+            wanted,
+            limited: budget.limited,
+            scattered,
+            beams: beams.len(),
+        })
+    }
+
+    /// After a search of the whole map: gives each cluster the weight of its best particle's likelihood. What a cluster has gathered until
+    /// then depends on how near to its peak one of the scattered particles lay, which is chance.
+    fn level_clusters(&mut self, beams: &Beams) {
+        let clusters = self.finder.find(&self.particles, self.division);
+        let mut best = vec![0_u32; clusters.len()];
+        self.weigher.weigh(&self.particles, beams, &mut self.points);
+        for (rank, points) in self.finder.ranks.iter().zip(&self.points) {
+            if let Some(best) = best.get_mut(*rank as usize) {
+                *best = (*best).max(*points);
+            }
+        }
+        let log = |points: u32| self.weigher.log_likelihood(points, beams.len());
+        let highest = log(best.iter().copied().max().unwrap_or(0));
+        let scale: Vec<f64> = clusters
+            .iter()
+            .zip(&best)
+            .map(|(cluster, points)| (log(*points) - highest).exp() / cluster.share.max(f64::MIN_POSITIVE))
+            .collect();
+        for (weight, rank) in self.particles.weight.iter_mut().zip(&self.finder.ranks) {
+            *weight *= scale.get(*rank as usize).copied().unwrap_or(0.0);
+        }
+        let total: f64 = self.particles.weight.iter().sum();
+        if total > 0.0 {
+            self.particles.weight.iter_mut().for_each(|weight| *weight /= total);
+        } else {
+            self.particles.level();
+        }
+    }
+
+    /// Draws the next generation when the particles have become too unequal or too many, with scattered ones among them when the scans
+    /// have ceased to fit. Returns how many were scattered.
+    fn renew(&mut self, beams: &Beams, effective: f64, wanted: usize, budget: &mut Budget) -> usize {
+        let (fewest, most) = (self.params.min_particles as usize, self.params.max_particles as usize);
+        let count = wanted.clamp(fewest, most);
+        let recovery = &self.params.recovery;
+        let early = if self.searches > 0 { 0.5 * recovery.most_scattered } else { 0.0 };
+        let share = self.averages.scatter_share(recovery).max(early);
+        let scattered = (share * count as f64) as usize;
+        let present = self.particles.len();
+        let too_unequal = effective < self.params.resample_share * present as f64;
+        // A little more than needed is no reason.
+        let too_many = present > most || count * 4 < present * 3;
+        if !(too_unequal || too_many || scattered > 0 || present < fewest) {
+            return 0;
+        }
+        if scattered == 0 {
+            self.draw(count);
+            return 0;
+        }
+        let candidates = budget.affordable(CANDIDATES * scattered.max(200), beams.len());
+        if candidates < scattered {
+            self.draw(count);
+            return 0;
+        }
+        self.draw(count - scattered);
+        let (mut others, mut spread) = self.scatter(candidates, false);
+        self.anneal(&mut others, beams, &mut spread, self.params.max_passes, budget);
+        self.epoch += 1;
+        let particles = &mut self.particles;
+        let kept = particles.len();
+        comb(&others.weight, scattered, self.seed, self.epoch, |index| particles.push(others.pose(index)));
+        // The scattered ones begin with little weight: they must fit much better to take over, not just as well.
+        let prior = SCATTERED_PRIOR * share;
+        let all = particles.len();
+        for (index, weight) in particles.weight.iter_mut().enumerate() {
+            *weight = if index < kept { *weight * (1.0 - prior) } else { prior / (all - kept) as f64 };
+        }
+        scattered
+    }
+
+    /// Draws the next generation from the clusters that were found last.
+    fn draw(&mut self, count: usize) {
+        self.epoch += 1;
+        resample_clusters(&self.particles, &mut self.spare, &self.finder.ranks, count, self.seed, self.epoch);
+        std::mem::swap(&mut self.particles, &mut self.spare);
+        self.shake();
+    }
+
+    /// Keeps particles apart that are copies of one.
+    fn shake(&mut self) {
+        self.epoch += 1;
+        let sigma_m = self.params.jitter_m as f32;
+        let sigma_rad = self.params.jitter_rad as f32;
+        self.particles.jitter(self.seed, self.epoch, sigma_m, sigma_rad);
+    }
+
+    /// Particles all over the map, and how far apart they are.
+    fn scatter(&mut self, count: usize, is_start: bool) -> (Particles, MotionSigma) {
+        self.epoch += 1;
+        let stream = Map::scatter_stream(self.seed, self.epoch, is_start);
+        let mut particles = Particles::default();
+        for index in 0..count {
+            particles.push(self.map.scattered(stream, index, count));
+        }
+        particles.level();
+        let places = (count as f64 / DIRECTIONS).max(1.0);
+        let apart_m = (self.map.free_area_m2() / places).sqrt();
+        let spread =
+            MotionSigma { place_m: 0.3 * apart_m, heading_rad: 0.3 * std::f64::consts::TAU / DIRECTIONS };
+        (particles, spread)
+    }
+
+    /// How many particles the belief needs: as many as its spread over bins asks for, when as many are drawn as there are now.
+    fn wanted(&mut self) -> usize {
+        let Self { bins, particles, division, .. } = self;
+        bins.reset(particles.len());
+        comb(&particles.weight, particles.len(), self.seed, self.epoch, |index| {
+            bins.add(division.bin(particles.pose(index)));
+        });
+        kld::enough(self.bins.bins.len(), self.params.kld_error, self.params.kld_quantile)
+    }
+
+    /// Weighs particles by a scan in passes. Each pass uses up as much of the scan's likelihood, as an exponent, as leaves enough
+    /// particles effective; what is then left is for the next pass, after these have been drawn anew and moved a little.
+    fn anneal(
+        &mut self,
+        particles: &mut Particles,
+        beams: &Beams,
+        spread: &mut MotionSigma,
+        passes: u32,
+        budget: &mut Budget,
+    ) -> Annealed {
+        let mut done = Annealed { fit: 0.0, passes: 0 };
+        let mut points = std::mem::take(&mut self.points);
+        let mut remaining = 1.0;
+        loop {
+            self.weigher.weigh(particles, beams, &mut points);
+            budget.spend(particles.len(), beams.len());
+            done.passes += 1;
+            if done.passes == 1 {
+                let mean: f64 = points.iter().zip(&particles.weight).map(|(&p, w)| f64::from(p) * w).sum();
+                done.fit = Weigher::fit(mean, beams.len());
+            }
+            let logs: Vec<f64> =
+                points.iter().map(|&points| self.weigher.log_likelihood(points, beams.len())).collect();
+            let effective = self.params.pass_effective_share * particles.len() as f64;
+            let exponent = if passes == 1 {
+                remaining
+            } else {
+                exponent(&particles.weight, &logs, remaining, effective)
+            };
+            sharpen(&mut particles.weight, &logs, exponent);
+            remaining -= exponent;
+            if remaining < 1e-6 || done.passes >= passes {
+                break;
+            }
+            let most = (self.params.max_particles as usize).max(particles.len() / 2).min(particles.len());
+            let count = budget.affordable(most, beams.len());
+            if count < most {
+                break;
+            }
+            self.finder.find(particles, self.division);
+            self.epoch += 1;
+            resample_clusters(particles, &mut self.spare, &self.finder.ranks, count, self.seed, self.epoch);
+            std::mem::swap(particles, &mut self.spare);
+            self.epoch += 1;
+            particles.jitter(self.seed, self.epoch, spread.place_m as f32, spread.heading_rad as f32);
+            spread.place_m = (spread.place_m * SHRINK).max(self.params.jitter_m);
+            spread.heading_rad = (spread.heading_rad * SHRINK).max(self.params.jitter_rad);
+        }
+        self.points = points;
+        done
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Annealed {
+    fit: f64,
+    passes: u32,
+}
+
+/// The largest exponent up to `most` with which at least `effective` particles stay effective.
+fn exponent(weights: &[f64], logs: &[f64], most: f64, effective: f64) -> f64 {
+    let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    // All, or an even selection: an estimate is enough.
+    let stride = weights.len().div_ceil(2048).max(1);
+    let share = (weights.len() as f64 / weights.len().div_ceil(stride) as f64).max(1.0);
+    let is_enough = |exponent: f64| {
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for (weight, log) in weights.iter().zip(logs).step_by(stride) {
+            let weight = weight * (exponent * (log - best)).exp();
+            sum += weight;
+            squares += weight * weight;
+        }
+        squares > 0.0 && sum * sum / squares * share >= effective
+    };
+    if is_enough(most) {
+        return most;
+    }
+    let (mut low, mut high) = (0.0, most);
+    for _ in 0..10 {
+        let middle = 0.5 * (low + high);
+        if is_enough(middle) { low = middle } else { high = middle }
+    }
+    // Never nothing, or the passes would lead nowhere.
+    low.max(1e-3 * most)
+}
+
+/// Multiplies weights by likelihoods to a power, and makes them sum to 1.
+fn sharpen(weights: &mut [f64], logs: &[f64], exponent: f64) {
+    let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mut total = 0.0;
+    for (weight, log) in weights.iter_mut().zip(logs) {
+        *weight *= (exponent * (log - best)).exp();
+        total += *weight;
+    }
+    if total > 0.0 && total.is_finite() {
+        let scale = 1.0 / total;
+        weights.iter_mut().for_each(|weight| *weight *= scale);
+    } else {
+        let share = 1.0 / weights.len().max(1) as f64;
+        weights.fill(share);
+    }
+}

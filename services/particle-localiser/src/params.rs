@@ -1,0 +1,430 @@
+//! The parameters of `particle-localiser`.
+
+use messages::Parameters;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Whose scans are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sensor {
+    /// `laser/scan`.
+    #[default]
+    Laser,
+    /// `sonar/scan`.
+    Sonar,
+}
+
+/// How a scan is compared with the map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Model {
+    /// Distance of each beam's end from the nearest wall, likelihoods multiplied (Thrun et al. 2005, table 6.3).
+    #[default]
+    LogProduct,
+    /// The same, with the sum of the likelihoods' cubes: blunt, and patient with what the map does not know.
+    LikelihoodField,
+    /// Each beam's range against the expected one: hit, short, random (Thrun et al. 2005, table 6.1).
+    Beam,
+    /// Each reading against the expected one by a Gaussian (NXT-057), each reading clipped.
+    Gaussian,
+}
+
+/// Errors of the odometry: standard deviations of what one update's travel adds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct MotionNoise {
+    /// Place, with every update: scans and odometry do not belong to the same instant.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub place_m: f64,
+    /// Place, for each metre of path.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub place_per_m: f64,
+    /// Place, for each radian of turning.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub place_m_per_rad: f64,
+    /// Heading, with every update.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub heading_rad: f64,
+    /// Heading, for each radian of turning.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub heading_per_rad: f64,
+    /// Heading, for each metre of path.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub heading_rad_per_m: f64,
+}
+
+impl Default for MotionNoise {
+    fn default() -> Self {
+        Self {
+            place_m: 0.02,
+            place_per_m: 0.10,
+            place_m_per_rad: 0.10,
+            heading_rad: 0.01,
+            heading_per_rad: 0.15,
+            heading_rad_per_m: 0.06,
+        }
+    }
+}
+
+/// Recovery of a robot that was carried away.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Recovery {
+    /// Share of a new scan in the slow average of the fit.
+    #[schemars(range(min = 0.0001, max = 0.5))]
+    pub slow_rate: f64,
+    /// Share of a new scan in the fast average, above `slow_rate`.
+    #[schemars(range(min = 0.001, max = 1.0))]
+    pub fast_rate: f64,
+    /// The fast average may lie below the slow one by this share before particles are scattered.
+    #[schemars(range(min = 0.0, max = 0.9))]
+    pub tolerance: f64,
+    /// No larger share of the particles is scattered at once; 0 turns recovery off.
+    #[schemars(range(min = 0.0, max = 0.9))]
+    pub most_scattered: f64,
+    /// For so many scans after a start without a pose the whole map is searched on, beside what has been found.
+    #[schemars(range(min = 0, max = 10000))]
+    pub early_scans: u32,
+}
+
+impl Default for Recovery {
+    fn default() -> Self {
+        Self { slow_rate: 0.02, fast_rate: 0.3, tolerance: 0.1, most_scattered: 0.3, early_scans: 10 }
+    }
+}
+
+/// A known pose at the start.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Start {
+    /// Place in the map.
+    #[schemars(range(min = -1000000.0, max = 1000000.0))]
+    pub x_m: f64,
+    /// Place in the map.
+    #[schemars(range(min = -1000000.0, max = 1000000.0))]
+    pub y_m: f64,
+    /// Heading in the map.
+    #[schemars(range(min = -10.0, max = 10.0))]
+    pub heading_rad: f64,
+    /// Standard deviation of the place.
+    #[serde(default = "start_sigma_m")]
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub sigma_m: f64,
+    /// Standard deviation of the heading.
+    #[serde(default = "start_sigma_rad")]
+    #[schemars(range(min = 0.0, max = 4.0))]
+    pub sigma_rad: f64,
+}
+
+fn start_sigma_m() -> f64 {
+    0.2
+}
+
+fn start_sigma_rad() -> f64 {
+    0.1
+}
+
+/// What `particle-localiser` can be told.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Params {
+    /// Map of the kind of ROS (the YAML file), or a world file (`.toml`); empty for none, and then no pose is ever found.
+    pub map: String,
+    /// The floor of a world file.
+    pub floor: i32,
+    /// Side of a cell where a world file's walls are drawn into a grid.
+    #[schemars(range(min = 0.002, max = 1.0))]
+    pub world_resolution_m: f64,
+    /// Cells that are occupied with at least this probability are walls.
+    #[schemars(range(min = 1, max = 100))]
+    pub occupied_percent: u8,
+    /// Whose scans are read.
+    pub sensor: Sensor,
+    /// How a scan is compared with the map.
+    pub model: Model,
+    /// Half of the opening angle within which the sensor reports the nearest; 0 for a ray. For the models that expect ranges.
+    #[schemars(range(min = 0.0, max = 0.8))]
+    pub cone_half_width_rad: f64,
+    /// From one ray of the cone to the next.
+    #[schemars(range(min = 0.001, max = 0.5))]
+    pub cone_step_rad: f64,
+    /// Readings of a scan that are used, evenly over the valid ones.
+    #[schemars(range(min = 1, max = 4096))]
+    pub beams: u32,
+    /// Readings from here on are left out, and no ray is followed farther.
+    #[schemars(range(min = 0.1, max = 1000.0))]
+    pub range_max_m: f64,
+    /// Standard deviation of a reading, the map's error included.
+    #[schemars(range(min = 0.001, max = 2.0))]
+    pub sigma_m: f64,
+    /// Share of readings that have nothing to do with the map.
+    #[schemars(range(min = 0.001, max = 0.9))]
+    pub random_share: f64,
+    /// Share of readings cut short by what the map does not know. Beam model.
+    #[schemars(range(min = 0.0, max = 0.9))]
+    pub short_share: f64,
+    /// A reading counts for no more than that many standard deviations. Gaussian model.
+    #[schemars(range(min = 0.5, max = 20.0))]
+    pub clip_sigmas: f64,
+    /// So many independent readings a scan is worth at most: neighbouring beams err alike.
+    #[schemars(range(min = 0.5, max = 4096.0))]
+    pub independent_beams: f64,
+    /// Fewest particles.
+    #[schemars(range(min = 10, max = 1000000))]
+    pub min_particles: u32,
+    /// Most particles while the pose is followed.
+    #[schemars(range(min = 10, max = 1000000))]
+    pub max_particles: u32,
+    /// Particles of a start without a pose.
+    #[schemars(range(min = 10, max = 4000000))]
+    pub global_particles: u32,
+    /// Bound of an update: particles times beams times passes. Below what the particles need, their number is lowered, and the cloud says
+    /// so; 0 for no bound.
+    pub budget_particle_beams: u64,
+    /// Passes over one scan at most: each sharpens the belief a little, so that few particles suffice for a scan that tells much.
+    #[schemars(range(min = 1, max = 50))]
+    pub max_passes: u32,
+    /// A pass sharpens the belief until so large a share of the particles is still effective.
+    #[schemars(range(min = 0.01, max = 0.9))]
+    pub pass_effective_share: f64,
+    /// Particles are drawn anew when a smaller share of them is effective.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub resample_share: f64,
+    /// Error of the belief that the number of particles is chosen for (KLD sampling).
+    #[schemars(range(min = 0.001, max = 0.5))]
+    pub kld_error: f64,
+    /// Upper normal quantile of the probability that the error is kept.
+    #[schemars(range(min = 0.1, max = 5.0))]
+    pub kld_quantile: f64,
+    /// Side of the bins in which particles are counted and clusters are found.
+    #[schemars(range(min = 0.005, max = 5.0))]
+    pub bin_m: f64,
+    /// The same for headings.
+    #[schemars(range(min = 0.01, max = 3.2))]
+    pub bin_rad: f64,
+    /// Errors of the odometry.
+    pub motion: MotionNoise,
+    /// Noise that keeps drawn particles apart, at least.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub jitter_m: f64,
+    /// The same for headings.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub jitter_rad: f64,
+    /// A scan is used after so much travel since the last one that was ...
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub update_distance_m: f64,
+    /// ... or after so much turning. With both 0 every scan is used.
+    #[schemars(range(min = 0.0, max = 3.2))]
+    pub update_turn_rad: f64,
+    /// Odometry that jumps farther from one message to the next has begun anew.
+    #[schemars(range(min = 0.1, max = 100.0))]
+    pub odometry_jump_m: f64,
+    /// Pose at the start, where it is known; without it the whole map is searched.
+    pub start: Option<Start>,
+    /// Recovery of a robot that was carried away.
+    pub recovery: Recovery,
+    /// The pose counts as found when its standard deviations lie below this ...
+    #[schemars(range(min = 0.001, max = 10.0))]
+    pub found_sigma_m: f64,
+    /// ... and this ...
+    #[schemars(range(min = 0.001, max = 3.2))]
+    pub found_sigma_rad: f64,
+    /// ... and when its cluster holds so much of the weight.
+    #[schemars(range(min = 0.1, max = 1.0))]
+    pub found_share: f64,
+    /// Threads that weigh the particles; the result does not depend on it.
+    #[schemars(range(min = 1, max = 16))]
+    pub threads: u32,
+    /// Time from one message with the particles to the next; 0 for none.
+    #[schemars(range(min = 0.0, max = 3600.0))]
+    pub cloud_period_s: f64,
+    /// Particles in such a message at most.
+    #[schemars(range(min = 1, max = 100000))]
+    pub cloud_particles: u32,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self {
+            map: String::new(),
+            floor: 0,
+            world_resolution_m: 0.05,
+            occupied_percent: 65,
+            sensor: Sensor::Laser,
+            model: Model::LogProduct,
+            cone_half_width_rad: 0.0,
+            cone_step_rad: 1.0_f64.to_radians(),
+            beams: 120,
+            range_max_m: 30.0,
+            sigma_m: 0.10,
+            random_share: 0.1,
+            short_share: 0.1,
+            clip_sigmas: 4.0,
+            independent_beams: 40.0,
+            min_particles: 500,
+            max_particles: 5000,
+            global_particles: 20_000,
+            budget_particle_beams: 0,
+            max_passes: 4,
+            pass_effective_share: 0.2,
+            resample_share: 0.5,
+            kld_error: 0.05,
+            kld_quantile: 2.33,
+            bin_m: 0.25,
+            bin_rad: 10.0_f64.to_radians(),
+            motion: MotionNoise::default(),
+            jitter_m: 0.005,
+            jitter_rad: 0.002,
+            update_distance_m: 0.05,
+            update_turn_rad: 0.03,
+            odometry_jump_m: 3.0,
+            start: None,
+            recovery: Recovery::default(),
+            found_sigma_m: 0.25,
+            found_sigma_rad: 0.12,
+            found_share: 0.8,
+            threads: 1,
+            cloud_period_s: 0.5,
+            cloud_particles: 2000,
+        }
+    }
+}
+
+/// Parameters that make no sense.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ParamsError {
+    /// A number outside of its range.
+    #[error("{name} = {value} must lie between {least} and {most}")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The smallest value allowed.
+        least: f64,
+        /// The largest value allowed.
+        most: f64,
+    },
+    /// Fewest above most.
+    #[error(
+        "min_particles = {min_particles} is above max_particles = {max_particles}; lower the one or raise the other"
+    )]
+    FewestAboveMost {
+        /// The fewest.
+        min_particles: u32,
+        /// The most.
+        max_particles: u32,
+    },
+    /// The averages of the recovery could never differ.
+    #[error(
+        "recovery.slow_rate = {slow_rate} is not below recovery.fast_rate = {fast_rate}; the fast average must react faster"
+    )]
+    SlowNotSlower {
+        /// Share of a new scan in the slow average.
+        slow_rate: f64,
+        /// Share of a new scan in the fast average.
+        fast_rate: f64,
+    },
+    /// Shares that leave nothing for readings of the map.
+    #[error(
+        "random_share = {random_share} and short_share = {short_share} leave nothing for readings of the map; lower one of them"
+    )]
+    NothingLeft {
+        /// Readings from nowhere.
+        random_share: f64,
+        /// Readings cut short.
+        short_share: f64,
+    },
+    /// A grid of the world would be too large.
+    #[error("world_resolution_m = {resolution_m}: the walls of the world make no grid: {cause}")]
+    Grid {
+        /// Side of a cell.
+        resolution_m: f64,
+        /// Why.
+        cause: geometry::GridError,
+    },
+}
+
+impl Parameters for Params {
+    type Error = ParamsError;
+
+    fn check(&self) -> Result<(), ParamsError> {
+        let start = self.start.unwrap_or(Start {
+            x_m: 0.0,
+            y_m: 0.0,
+            heading_rad: 0.0,
+            sigma_m: 0.1,
+            sigma_rad: 0.1,
+        });
+        let motion = self.motion;
+        let recovery = self.recovery;
+        let ranges = [
+            ("world_resolution_m", self.world_resolution_m, 0.002, 1.0),
+            ("occupied_percent", f64::from(self.occupied_percent), 1.0, 100.0),
+            ("cone_half_width_rad", self.cone_half_width_rad, 0.0, 0.8),
+            ("cone_step_rad", self.cone_step_rad, 0.001, 0.5),
+            ("beams", f64::from(self.beams), 1.0, 4096.0),
+            ("range_max_m", self.range_max_m, 0.1, 1000.0),
+            ("sigma_m", self.sigma_m, 0.001, 2.0),
+            ("random_share", self.random_share, 0.001, 0.9),
+            ("short_share", self.short_share, 0.0, 0.9),
+            ("clip_sigmas", self.clip_sigmas, 0.5, 20.0),
+            ("independent_beams", self.independent_beams, 0.5, 4096.0),
+            ("min_particles", f64::from(self.min_particles), 10.0, 1e6),
+            ("max_particles", f64::from(self.max_particles), 10.0, 1e6),
+            ("global_particles", f64::from(self.global_particles), 10.0, 4e6),
+            ("max_passes", f64::from(self.max_passes), 1.0, 50.0),
+            ("pass_effective_share", self.pass_effective_share, 0.01, 0.9),
+            ("resample_share", self.resample_share, 0.0, 1.0),
+            ("kld_error", self.kld_error, 0.001, 0.5),
+            ("kld_quantile", self.kld_quantile, 0.1, 5.0),
+            ("bin_m", self.bin_m, 0.005, 5.0),
+            ("bin_rad", self.bin_rad, 0.01, 3.2),
+            ("motion.place_m", motion.place_m, 0.0, 1.0),
+            ("motion.place_per_m", motion.place_per_m, 0.0, 1.0),
+            ("motion.place_m_per_rad", motion.place_m_per_rad, 0.0, 1.0),
+            ("motion.heading_rad", motion.heading_rad, 0.0, 1.0),
+            ("motion.heading_per_rad", motion.heading_per_rad, 0.0, 1.0),
+            ("motion.heading_rad_per_m", motion.heading_rad_per_m, 0.0, 1.0),
+            ("jitter_m", self.jitter_m, 0.0, 0.5),
+            ("jitter_rad", self.jitter_rad, 0.0, 0.5),
+            ("update_distance_m", self.update_distance_m, 0.0, 10.0),
+            ("update_turn_rad", self.update_turn_rad, 0.0, 3.2),
+            ("odometry_jump_m", self.odometry_jump_m, 0.1, 100.0),
+            ("start.x_m", start.x_m, -1e6, 1e6),
+            ("start.y_m", start.y_m, -1e6, 1e6),
+            ("start.heading_rad", start.heading_rad, -10.0, 10.0),
+            ("start.sigma_m", start.sigma_m, 0.0, 100.0),
+            ("start.sigma_rad", start.sigma_rad, 0.0, 4.0),
+            ("recovery.slow_rate", recovery.slow_rate, 0.0001, 0.5),
+            ("recovery.fast_rate", recovery.fast_rate, 0.001, 1.0),
+            ("recovery.tolerance", recovery.tolerance, 0.0, 0.9),
+            ("recovery.most_scattered", recovery.most_scattered, 0.0, 0.9),
+            ("recovery.early_scans", f64::from(recovery.early_scans), 0.0, 1e4),
+            ("found_sigma_m", self.found_sigma_m, 0.001, 10.0),
+            ("found_sigma_rad", self.found_sigma_rad, 0.001, 3.2),
+            ("found_share", self.found_share, 0.1, 1.0),
+            ("threads", f64::from(self.threads), 1.0, 16.0),
+            ("cloud_period_s", self.cloud_period_s, 0.0, 3600.0),
+            ("cloud_particles", f64::from(self.cloud_particles), 1.0, 1e5),
+        ];
+        for (name, value, least, most) in ranges {
+            if !(value >= least && value <= most) {
+                return Err(ParamsError::OutOfRange { name, value, least, most });
+            }
+        }
+        let Self { min_particles, max_particles, random_share, short_share, .. } = *self;
+        if min_particles > max_particles {
+            return Err(ParamsError::FewestAboveMost { min_particles, max_particles });
+        }
+        let Recovery { slow_rate, fast_rate, .. } = recovery;
+        if slow_rate >= fast_rate {
+            return Err(ParamsError::SlowNotSlower { slow_rate, fast_rate });
+        }
+        if random_share + short_share > 0.95 {
+            return Err(ParamsError::NothingLeft { random_share, short_share });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,3 @@
+//! Cases, one line each.
+
+mod pieces;
