@@ -245,6 +245,21 @@ pub fn sweep() -> io::Result<Vec<Swept>> {
     Ok(swept)
 }
 
+/// Clears away as [`sweep`] does, but the board of this name alone where one is named: who says which board is meant does not touch others.
+///
+/// # Errors
+/// When something cannot be removed, or the name is none.
+pub fn sweep_named(board: Option<&str>) -> io::Result<Vec<Swept>> {
+    match board {
+        None => sweep(),
+        Some(name) => {
+            let place =
+                Place::new(name).map_err(|error| io::Error::new(io::ErrorKind::InvalidInput, error))?;
+            Ok(clear(&place)?.into_iter().collect())
+        }
+    }
+}
+
 /// Clears away what is left of a board whose launcher is gone; a board that is up stays as it is.
 ///
 /// # Errors

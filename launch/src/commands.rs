@@ -26,10 +26,10 @@ pub(crate) fn finish(outcome: Outcome) -> ExitCode {
     }
 }
 
-/// Clears away boards whose launcher is gone, and says so.
-pub(crate) fn sweep() -> Outcome {
-    let swept =
-        host::sweep().map_err(|error| format!("what is left of a board cannot be cleared away: {error}"))?;
+/// Clears away boards whose launcher is gone, and says so: the one that is named, or else all of them.
+pub(crate) fn sweep(board: Option<&str>) -> Outcome {
+    let swept = host::sweep_named(board)
+        .map_err(|error| format!("what is left of a board cannot be cleared away: {error}"))?;
     for board in swept {
         eprintln!("{}", crate::summary::swept(&board));
     }
@@ -38,7 +38,7 @@ pub(crate) fn sweep() -> Outcome {
 
 /// `launch ps`.
 pub(crate) fn ps(args: &StatusArgs) -> Outcome {
-    sweep()?;
+    sweep(args.running.board.as_deref())?;
     let status = status_of(&control::choose(args.running.board.as_deref())?)?;
     if args.json {
         println!("{}", serde_json::to_string_pretty(&status).map_err(|error| error.to_string())?);
@@ -51,7 +51,7 @@ pub(crate) fn ps(args: &StatusArgs) -> Outcome {
 
 /// `launch top`: `ps`, again and again, until Ctrl-C or the graph's end.
 pub(crate) fn top(args: &StatusArgs) -> Outcome {
-    sweep()?;
+    sweep(args.running.board.as_deref())?;
     let place = control::choose(args.running.board.as_deref())?;
     loop {
         let status = match status_of(&place) {
@@ -81,7 +81,7 @@ pub(crate) fn top(args: &StatusArgs) -> Outcome {
 
 /// `launch logs`.
 pub(crate) fn logs(args: &LogsArgs) -> Outcome {
-    sweep()?;
+    sweep(args.running.board.as_deref())?;
     let place = control::choose(args.running.board.as_deref())?;
     let status = status_of(&place)?;
     if let Some(service) = &args.service
@@ -118,7 +118,7 @@ pub(crate) fn logs(args: &LogsArgs) -> Outcome {
 
 /// `launch restart`.
 pub(crate) fn restart(args: &RestartArgs) -> Outcome {
-    sweep()?;
+    sweep(args.running.board.as_deref())?;
     let place = control::choose(args.running.board.as_deref())?;
     control::ask(&place, &Request::Restart { role: args.service.clone() })?;
     println!("`{}` is being restarted", args.service);
@@ -127,7 +127,7 @@ pub(crate) fn restart(args: &RestartArgs) -> Outcome {
 
 /// `launch stop`: comes back when nothing is left.
 pub(crate) fn stop(args: &StopArgs) -> Outcome {
-    sweep()?;
+    sweep(args.running.board.as_deref())?;
     let place = control::choose(args.running.board.as_deref())?;
     control::ask(&place, &Request::Stop { fast: args.fast })?;
     let deadline = clock::monotonic().after(Duration::from_secs(30));
@@ -138,7 +138,7 @@ pub(crate) fn stop(args: &StopArgs) -> Outcome {
         clock::sleep(Duration::from_millis(5));
     }
     // If it was killed while it stopped, something is left.
-    sweep()?;
+    sweep(args.running.board.as_deref())?;
     println!("the board `{}` is down", place.name());
     Ok(())
 }
@@ -146,7 +146,7 @@ pub(crate) fn stop(args: &StopArgs) -> Outcome {
 /// `launch order`.
 pub(crate) fn order(args: &OrderArgs) -> Outcome {
     const ORDERS: &str = "mission/orders";
-    sweep()?;
+    sweep(args.running.board.as_deref())?;
     let place = control::choose(args.running.board.as_deref())?;
     let mut tap = Tap::join(place, "order").map_err(|error| error.to_string())?;
     let Some((_, topic)) = tap.manifest().topic(ORDERS) else {

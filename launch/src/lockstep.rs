@@ -195,7 +195,7 @@ fn outcome(conductor: &Conductor, observer: &Observer, began: Time, interrupted:
 /// `launch up --lockstep`, with its last lines.
 pub(crate) fn up(graph: &Checked, options: &Options, pace: &Pace, display: &mut dyn Display) -> ExitCode {
     let run = || -> Result<Outcome, Box<dyn std::error::Error>> {
-        for swept in board::host::sweep()? {
+        for swept in board::host::sweep_named(options.board.as_deref())? {
             eprintln!("{}", summary::swept(&swept));
         }
         let signals = Signals::catch()?;

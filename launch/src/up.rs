@@ -68,7 +68,7 @@ fn run(
     options: &Options,
     display: &mut dyn Display,
 ) -> Result<ExitCode, Box<dyn std::error::Error>> {
-    for swept in board::host::sweep()? {
+    for swept in board::host::sweep_named(options.board.as_deref())? {
         eprintln!("{}", summary::swept(&swept));
     }
     let board = options.board.as_deref().unwrap_or(&graph.name);

@@ -67,7 +67,8 @@ fn after_everything_was_killed_at_once() {
         .to_vec();
     graph.kill_launcher();
     pids.iter().for_each(|&pid| signal(pid, "KILL"));
-    let output = Command::new(launcher()).arg("ps").output().unwrap();
+    // Of this board alone: without its name the command clears away those of the tests beside it too.
+    let output = Command::new(launcher()).args(["ps", "--board", graph.board()]).output().unwrap();
     assert!(!String::from_utf8_lossy(&output.stderr).contains("cannot be cleared"), "{output:?}");
     assert_eq!(remains(&place), Vec::<String>::new());
 }
