@@ -85,6 +85,13 @@ fn command(about: About) -> Command {
         .arg(text("role", "ROLE", "The service's name in the graph [default: the binary's name]"))
         .arg(text("params", "JSON", "Parameters, as a JSON object; see --example").default_value("{}"))
         .arg(text("slot", "N", "The place that the launcher has prepared").value_parser(value_parser!(u32)).hide(true))
+        .arg(
+            Arg::new("shadow")
+                .long("shadow")
+                .action(ArgAction::SetTrue)
+                .hide(true)
+                .help("Publish beside the topics of the role, to be compared"),
+        )
         .arg(text("cpu", "N", "Run on this processor only").value_parser(value_parser!(usize)).action(ArgAction::Append))
         .arg(text("fifo", "PRIORITY", "Real-time priority, 1 to 99").value_parser(value_parser!(i32).range(1..=99)))
         .arg(
@@ -149,10 +156,12 @@ fn serve(
     apply_scheduling(arguments)?;
     let shared = Rc::clone(&joined.shared);
     catch_signals(&shared)?;
-    let mut node = Node::joined(&role, joined);
+    let is_shadow = arguments.get_flag("shadow");
+    let mut node = Node::joined(&role, joined, is_shadow);
     let step = make(&mut node, parameters(arguments)?)?;
     let Some(mut joined) = node.joined.take() else { return Ok(()) };
-    let health = open_health(&mut joined, &role)?;
+    let name = if is_shadow { host::shadow_role(&role) } else { role };
+    let health = open_health(&mut joined, &name)?;
     let mut service = Service {
         shared: Rc::clone(&shared),
         wakes: node.wakes.iter().map(|&topic| (topic, 0)).collect(),

@@ -12,6 +12,7 @@ Examples:
   launch up coffee --set collision-avoidance.front_radius_m=0.25 --detach
   launch experiment coffee                         many runs, with statistics and plots
   launch order 207                                 coffee for room 207, please
+  launch swap controller=window-controller         while it drives
   launch logs planner -f                           follow what the planner says
   launch stop                                      stop the robot, then its services";
 
@@ -43,6 +44,9 @@ pub(crate) enum Command {
     Logs(LogsArgs),
     /// Start a service of a running graph anew
     Restart(RestartArgs),
+    /// Let another service play a role while the robot runs, without a gap
+    #[command(after_help = SWAP_HELP)]
+    Swap(SwapArgs),
     /// Stop a running graph: the robot first, then its services
     Stop(StopArgs),
     /// Run variants of a graph many times in lockstep, and compare them
@@ -110,6 +114,17 @@ Exit code: 0 all runs were done and every expectation of the file holds, 1 other
 Examples:
   launch experiment coffee
   launch experiment ./radii.toml --jobs 1 --out /tmp/radii";
+
+const SWAP_HELP: &str = "\
+The newcomer starts beside the old service, mute. When it takes steps and has something to say, its messages count, and the old one is asked to
+leave. If it dies or refuses its parameters before, the old one goes on as it was.
+A shadow stays mute: what it would say is shown against what the service says, field by field, until Ctrl-C.
+
+Examples:
+  launch swap controller=window-controller
+  launch swap planner=sampling-planner --set robot_radius_m=0.32
+  launch swap controller=window-controller --shadow --for 30
+  launch swap --back controller";
 
 /// Which graph, and what is different about it this time.
 #[derive(Debug, Clone, Args)]
@@ -245,6 +260,38 @@ pub(crate) struct RestartArgs {
     /// The service
     #[arg(value_name = "SERVICE")]
     pub(crate) service: String,
+    /// The board.
+    #[command(flatten)]
+    pub(crate) running: Running,
+}
+
+/// `launch swap`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SwapArgs {
+    /// The role, and the binary that is to play it (a name, or a path)
+    #[arg(value_name = "ROLE=BINARY", required_unless_present = "back")]
+    pub(crate) swap: Option<String>,
+    /// A parameter of the newcomer; any number of times
+    #[arg(long, value_name = "KEY=VALUE", conflicts_with = "back")]
+    pub(crate) set: Vec<String>,
+    /// Keep it mute, and show how its messages differ
+    #[arg(long, conflicts_with = "back")]
+    pub(crate) shadow: bool,
+    /// With --shadow: end after so many seconds, instead of on Ctrl-C
+    #[arg(long = "for", value_name = "SECONDS", requires = "shadow", value_parser = positive)]
+    pub(crate) length_s: Option<f64>,
+    /// Let it run beside the old one for so many seconds at least
+    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["back", "shadow"], value_parser = positive)]
+    pub(crate) warm_up: Option<f64>,
+    /// Bring back what played this role before, or send its newcomer away
+    #[arg(long, value_name = "ROLE", conflicts_with = "swap")]
+    pub(crate) back: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// In a source checkout: use what is built already
+    #[arg(long)]
+    pub(crate) no_build: bool,
     /// The board.
     #[command(flatten)]
     pub(crate) running: Running,

@@ -17,7 +17,7 @@ mod tests;
 mod topics;
 mod tree;
 
-pub(crate) use check::{Checked, CheckedService, Publisher};
-pub(crate) use file::Overrides;
+pub(crate) use check::{Checked, CheckedService, CheckedTopic};
+pub(crate) use file::{Overrides, shown};
 pub(crate) use report::{Request, check_command, graph_command, prepare};
 pub(crate) use settings::{Priority, ViewSettings};

@@ -132,7 +132,7 @@ fn play(
     let mut interrupted = false;
     while observer.verdict().is_none() && conductor.now() < limit {
         let pids: Vec<(String, Option<u32>)> =
-            supervisor.services.iter().map(|service| (service.service.role.clone(), service.pid)).collect();
+            supervisor.services.iter().map(|service| (service.service.role.clone(), service.pid())).collect();
         let mut lives = |role: &str| {
             let pid = pids.iter().find(|(known, _)| known == role).and_then(|(_, pid)| *pid);
             pid.is_some_and(board::switchboard::process_lives)

@@ -12,8 +12,10 @@ mod lockstep;
 mod monitor;
 mod observer;
 mod plain;
+mod shadow;
 mod summary;
 mod supervise;
+mod swap;
 mod up;
 mod view;
 
@@ -30,6 +32,7 @@ fn main() -> ExitCode {
         Command::Top(args) => commands::finish(commands::top(&args)),
         Command::Logs(args) => commands::finish(commands::logs(&args)),
         Command::Restart(args) => commands::finish(commands::restart(&args)),
+        Command::Swap(args) => commands::finish(swap::command(&args)),
         Command::Stop(args) => commands::finish(commands::stop(&args)),
         Command::Experiment(args) => experiment::command(&args),
         Command::Graph(args) => graph::graph_command(&args.which.request(None), args.dot),

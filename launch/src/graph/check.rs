@@ -1,5 +1,6 @@
 //! Whether a graph can run: every binary's word against the graph's.
 
+use super::file::Overrides;
 use super::problem::{Problem, Problems};
 use super::schema::Schema;
 use super::settings::{Graph, LaunchSettings, ServiceTable, ViewSettings};
@@ -8,7 +9,7 @@ use super::topics::{Member, connect};
 use super::tree::{Content, Entry, Node};
 use board::{Direction, Interface};
 use messages::Description;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
@@ -53,6 +54,8 @@ pub(crate) struct Checked {
     pub(crate) folder: PathBuf,
     /// From which all randomness comes.
     pub(crate) seed: u64,
+    /// What the command line changed in the file.
+    pub(crate) overrides: Overrides,
     /// The topic whose `RunSummary` ends the run.
     pub(crate) finish: Option<String>,
     /// What the live view shows.
@@ -64,7 +67,7 @@ pub(crate) struct Checked {
 }
 
 /// A service that can run.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct CheckedService {
     /// Its name in this graph.
     pub(crate) role: String,
@@ -81,7 +84,7 @@ pub(crate) struct CheckedService {
 }
 
 /// A topic of the graph.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct CheckedTopic {
     /// Its name.
     pub(crate) name: String,
@@ -98,7 +101,7 @@ pub(crate) struct CheckedTopic {
 }
 
 /// Who publishes a topic.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Publisher {
     /// This role.
@@ -109,8 +112,18 @@ pub(crate) enum Publisher {
     Nobody,
 }
 
+impl Publisher {
+    /// The service that publishes it, if one does.
+    pub(crate) fn role(&self) -> Option<&str> {
+        match self {
+            Self::Service(role) => Some(role),
+            Self::External | Self::Nobody => None,
+        }
+    }
+}
+
 /// A reader of a topic.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Reader {
     /// The role that reads.
     pub(crate) role: String,
@@ -181,6 +194,7 @@ pub(crate) fn check(
         file: graph.file.clone(),
         folder: graph.folder.clone(),
         seed: graph.seed,
+        overrides: graph.overrides.clone(),
         finish: graph.finish.as_ref().map(|(topic, _)| topic.clone()),
         view: graph.view.clone(),
         services: services.collect(),

@@ -5,11 +5,12 @@ use super::settings::{Graph, read_graph};
 use super::source::{Place, Source};
 use super::suggest::hint;
 use super::tree::{Content, Entry, Node, Table, parse, parse_value};
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// What the command line changes in a graph.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Overrides {
     /// `role.key=value`: parameters, `run`, and `role.launch.key`.
     pub(crate) set: Vec<String>,
@@ -46,7 +47,8 @@ pub(crate) fn load(path: &Path, overrides: &Overrides, problems: &mut Problems) 
         return None;
     }
     apply(overrides, &mut table, problems);
-    read_graph(path, &source, &table, problems)
+    let graph = read_graph(path, &source, &table, problems)?;
+    Some(Graph { overrides: overrides.clone(), ..graph })
 }
 
 /// A path as people would type it: relative to the current folder if it lies within.

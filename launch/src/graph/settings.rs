@@ -1,11 +1,11 @@
 //! What the tables of a graph file mean to the launcher.
 
-use super::file::shown;
+use super::file::{Overrides, shown};
 use super::problem::{Problem, Problems};
 use super::source::{Place, Source};
 use super::suggest::hint;
 use super::tree::{Content, Entry, Node, Table};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -24,6 +24,8 @@ pub(crate) struct Graph {
     pub(crate) name: String,
     /// From which all randomness comes.
     pub(crate) seed: u64,
+    /// What the command line changed.
+    pub(crate) overrides: Overrides,
     /// The topic whose `RunSummary` ends the run.
     pub(crate) finish: Option<(String, Place)>,
     /// Topics that tools publish from outside.
@@ -56,7 +58,7 @@ pub(crate) struct ServiceTable {
 }
 
 /// What the launcher, not the service, reads: `[role.launch]`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LaunchSettings {
     /// When a dead service is started again; `None` for never.
     pub(crate) restart: Option<Restart>,
@@ -75,7 +77,7 @@ pub(crate) struct LaunchSettings {
 }
 
 /// When a dead service is started again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Restart {
     /// Wait before the first restart.
     pub(crate) backoff_min: Duration,
@@ -86,7 +88,7 @@ pub(crate) struct Restart {
 }
 
 /// How the operating system ranks a process.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Priority {
     /// As any other.
@@ -170,6 +172,7 @@ pub(crate) fn read_graph(
         folder: folder.canonicalize().unwrap_or(folder),
         name: stem.to_owned(),
         seed: 1,
+        overrides: Overrides::default(),
         finish: None,
         external: Vec::new(),
         defaults: Vec::new(),
