@@ -52,6 +52,9 @@ pub(crate) enum Command {
     /// Run variants of a graph many times in lockstep, and compare them
     #[command(after_help = EXPERIMENT_HELP)]
     Experiment(ExperimentArgs),
+    /// Kill, stop and restart services of a live robot at random, and check that it stays safe and heals
+    #[command(after_help = CHAOS_HELP)]
+    Chaos(ChaosArgs),
     /// Draw services and topics
     #[command(
         after_help = "Examples:\n  launch graph coffee > coffee.mmd\n  launch graph coffee --dot | dot -Tsvg > coffee.svg"
@@ -114,6 +117,16 @@ Exit code: 0 all runs were done and every expectation of the file holds, 1 other
 Examples:
   launch experiment coffee
   launch experiment ./radii.toml --jobs 1 --out /tmp/radii";
+
+const CHAOS_HELP: &str = "\
+Everybody is hit but the simulator and the referee, which are no part of the robot. After each deed it is checked that the wheels stood in time when
+the victim was in their chain, and that the victim came back; at the end that nothing was touched and nothing is left behind. The robot is kept busy
+with orders where the graph takes them.
+Exit code: 0 everything held, 1 otherwise.
+
+Examples:
+  launch chaos coffee --kills 100
+  launch chaos coffee --kills 1000 --seed 7 --spare planner --json";
 
 const SWAP_HELP: &str = "\
 The newcomer starts beside the old service, mute. When it takes steps and has something to say, its messages count, and the old one is asked to
@@ -332,6 +345,32 @@ pub(crate) struct ExperimentArgs {
     /// In a source checkout: use what is built already
     #[arg(long)]
     pub(crate) no_build: bool,
+}
+
+/// `launch chaos`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ChaosArgs {
+    /// The graph.
+    #[command(flatten)]
+    pub(crate) which: Which,
+    /// How many deeds
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) kills: u64,
+    /// Who is not hit; any number of times
+    #[arg(long, value_name = "ROLE")]
+    pub(crate) spare: Vec<String>,
+    /// Name the board otherwise than the graph does
+    #[arg(long, value_name = "NAME")]
+    pub(crate) board: Option<String>,
+    /// Print what happens, a line an event
+    #[arg(long)]
+    pub(crate) events: bool,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Where the logs of the services go
+    #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
+    pub(crate) log_dir: Option<PathBuf>,
 }
 
 /// `launch graph`.

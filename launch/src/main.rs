@@ -1,5 +1,6 @@
 //! The launcher: checks, starts, watches, swaps and stops the services of a robot.
 
+mod chaos;
 mod cli;
 mod commands;
 mod compare;
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
         Command::Restart(args) => commands::finish(commands::restart(&args)),
         Command::Swap(args) => commands::finish(swap::command(&args)),
         Command::Stop(args) => commands::finish(commands::stop(&args)),
+        Command::Chaos(args) => chaos::command(&args),
         Command::Experiment(args) => experiment::command(&args),
         Command::Graph(args) => graph::graph_command(&args.which.request(None), args.dot),
         Command::Order(args) => commands::finish(commands::order(&args)),
