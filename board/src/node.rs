@@ -2,7 +2,7 @@
 
 use crate::host::{health_topic, shadow_role, shadow_topic};
 use crate::interface::{Direction, PortDescription};
-use crate::kept::Kept;
+use crate::kept::{Home, Kept};
 use crate::manifest::Manifest;
 use crate::place::Place;
 use crate::port::{Latest, Publisher, PublisherLink, Queue, Reader, ReaderLink};
@@ -339,9 +339,9 @@ impl Node {
     pub fn kept<S: Serialize + DeserializeOwned>(&self) -> Kept<S> {
         let health = health_topic(&self.role);
         let home = self.joined.as_ref().and_then(|joined| {
-            let (topic, _) = joined.manifest.topic(&health)?;
-            let file = joined.place.file(&format!("state-{}.json", self.role));
-            Some((file, Rc::clone(&joined.shared), topic))
+            let (health, _) = joined.manifest.topic(&health)?;
+            let file = joined.place.file(&format!("state-{}", self.role));
+            Some(Home { file, shared: Rc::clone(&joined.shared), health })
         });
         Kept::new(home)
     }

@@ -5,7 +5,7 @@ use crate::example;
 use crate::health::StepTimes;
 use crate::host;
 use crate::interface::{About, Interface};
-use crate::node::{Joined, Node};
+use crate::node::{JoinError, Joined, Node};
 use crate::place::Place;
 use crate::port::{PublisherLink, bytes_of};
 use crate::shared::Shared;
@@ -24,6 +24,8 @@ type Step = Box<dyn FnMut(Time)>;
 
 /// A service ends with this code when its set-up is wrong: starting it again would not help.
 pub const EXIT_SETUP: u8 = 2;
+/// A service ends with this code when the board had no room for it: another time it may have.
+const EXIT_FAILED: u8 = 1;
 /// Longest sleep: how often a waiting process shows that it lives.
 const HEARTBEAT: Duration = Duration::from_millis(100);
 const HEALTH_PERIOD: Duration = Duration::from_secs(1);
@@ -68,9 +70,14 @@ fn run_with(
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::from(EXIT_SETUP)
+            ExitCode::from(if passes_by(&*error) { EXIT_FAILED } else { EXIT_SETUP })
         }
     }
+}
+
+/// Whether an error is the board's and not the set-up's, so that another start may help.
+fn passes_by(error: &(dyn Error + Send + Sync + 'static)) -> bool {
+    matches!(error.downcast_ref(), Some(JoinError::Transport(_) | JoinError::Full { .. }))
 }
 
 fn command(about: About) -> Command {

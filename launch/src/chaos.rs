@@ -123,6 +123,7 @@ fn hurt(
     }
     report.took_s = clock::monotonic().seconds_since(began);
     report.contacts = scene.contacts();
+    report.way_m = scene.way_m();
     report.deliveries = scene.deliveries();
     report.interrupted = signals.count() > 0;
     report.given_up = supervisor.failed().map(|service| {

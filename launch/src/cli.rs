@@ -55,6 +55,9 @@ pub(crate) enum Command {
     /// Kill, stop and restart services of a live robot at random, and check that it stays safe and heals
     #[command(after_help = CHAOS_HELP)]
     Chaos(ChaosArgs),
+    /// Write a small service to begin with: parameters, step, tests, shell
+    #[command(after_help = NEW_HELP)]
+    New(NewArgs),
     /// Draw services and topics
     #[command(
         after_help = "Examples:\n  launch graph coffee > coffee.mmd\n  launch graph coffee --dot | dot -Tsvg > coffee.svg"
@@ -127,6 +130,14 @@ Exit code: 0 everything held, 1 otherwise.
 Examples:
   launch chaos coffee --kills 100
   launch chaos coffee --kills 1000 --seed 7 --spare planner --json";
+
+const NEW_HELP: &str = "\
+It builds, passes its tests and runs in a graph as it is. In a source checkout it becomes a member of the workspace; in another folder it is a repository of its
+own, and a graph names it by its path.
+
+Examples:
+  launch new door-bell
+  launch new door-bell --in ~/my-robot";
 
 const SWAP_HELP: &str = "\
 The newcomer starts beside the old service, mute. When it takes steps and has something to say, its messages count, and the old one is asked to
@@ -371,6 +382,20 @@ pub(crate) struct ChaosArgs {
     /// Where the logs of the services go
     #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
     pub(crate) log_dir: Option<PathBuf>,
+}
+
+/// `launch new`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct NewArgs {
+    /// The service's name: a noun in lower-case letters, digits and hyphens
+    #[arg(value_name = "NAME")]
+    pub(crate) name: String,
+    /// The folder in which its folder is made; `services` of the checkout without
+    #[arg(long = "in", value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
+    pub(crate) folder: Option<PathBuf>,
+    /// The sources of Corkboard, when the launcher was not built from a checkout
+    #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
+    pub(crate) corkboard: Option<PathBuf>,
 }
 
 /// `launch graph`.

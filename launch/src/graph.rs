@@ -19,5 +19,6 @@ mod tree;
 
 pub(crate) use check::{Checked, CheckedService, CheckedTopic};
 pub(crate) use file::{Overrides, shown};
+pub(crate) use find::checkout;
 pub(crate) use report::{Request, check_command, graph_command, prepare};
 pub(crate) use settings::{Priority, ViewSettings};

@@ -11,6 +11,7 @@ mod experiment;
 mod graph;
 mod lockstep;
 mod monitor;
+mod new;
 mod observer;
 mod plain;
 mod shadow;
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
         Command::Swap(args) => commands::finish(swap::command(&args)),
         Command::Stop(args) => commands::finish(commands::stop(&args)),
         Command::Chaos(args) => chaos::command(&args),
+        Command::New(args) => commands::finish(new::command(&args)),
         Command::Experiment(args) => experiment::command(&args),
         Command::Graph(args) => graph::graph_command(&args.which.request(None), args.dot),
         Command::Order(args) => commands::finish(commands::order(&args)),

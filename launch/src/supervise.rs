@@ -28,7 +28,7 @@ const WHEELS: &str = "wheels/applied";
 /// How long a service may take to join the board.
 const START_LIMIT: Duration = Duration::from_secs(10);
 /// A service that ran for so long was sound: its next restart is immediate again.
-const SOUND_AFTER: Duration = Duration::from_secs(1);
+const SOUND_AFTER: Duration = Duration::from_millis(500);
 const EVENTS_KEPT: usize = 200;
 
 /// Something that the operator wants to know.

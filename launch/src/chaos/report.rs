@@ -18,6 +18,8 @@ pub(super) struct Report {
     in_start_up: u64,
     by_kind: BTreeMap<Kind, u64>,
     healed: u64,
+    /// The same while somebody else was down as well, from whom it may have needed something.
+    heals_beside_others_ms: Vec<f64>,
     /// From death to the successor's first message, by what was done.
     heals_ms: BTreeMap<Kind, Vec<f64>>,
     /// The slowest of each service after a kill.
@@ -29,6 +31,7 @@ pub(super) struct Report {
     /// Who was given up by the launcher.
     pub(super) given_up: Option<String>,
     pub(super) contacts: Option<u64>,
+    pub(super) way_m: Option<f64>,
     pub(super) deliveries: Option<u64>,
     pub(super) left_behind: usize,
     pub(super) took_s: f64,
@@ -60,9 +63,13 @@ impl Report {
         }
         if let Some(heal) = wound.heal().filter(|_| wound.speaks && !wound.in_start_up) {
             let ms = heal.as_secs_f64() * 1e3;
-            self.heals_ms.entry(wound.kind).or_default().push(ms);
-            let slowest = self.slowest_ms.entry(wound.role.clone()).or_default();
-            *slowest = slowest.max(ms);
+            if wound.alone {
+                self.heals_ms.entry(wound.kind).or_default().push(ms);
+                let slowest = self.slowest_ms.entry(wound.role.clone()).or_default();
+                *slowest = slowest.max(ms);
+            } else {
+                self.heals_beside_others_ms.push(ms);
+            }
         }
     }
 
@@ -113,6 +120,12 @@ impl Report {
                 );
             }
         }
+        if !self.heals_beside_others_ms.is_empty() {
+            let [median, most, max] = quantiles(&self.heals_beside_others_ms);
+            let count = self.heals_beside_others_ms.len();
+            let value = format!("median {median:.0} ms, 99 % {most:.0} ms, max {max:.0} ms ({count})");
+            line("the same while others were down", value);
+        }
         let mut slowest: Vec<(&String, &f64)> = self.slowest_ms.iter().collect();
         slowest.sort_by(|a, b| b.1.total_cmp(a.1));
         let slowest: Vec<String> =
@@ -125,6 +138,7 @@ impl Report {
         );
         let or_unknown = |value: Option<u64>| value.map_or("unknown".to_owned(), |value| value.to_string());
         line("contacts", or_unknown(self.contacts));
+        line("way", self.way_m.map_or("unknown".to_owned(), |way_m| format!("{way_m:.1} m")));
         line("deliveries meanwhile", or_unknown(self.deliveries));
         line("files left behind", self.left_behind.to_string());
         for wrong in self.too_late.iter().take(SHOWN) {
@@ -165,6 +179,7 @@ impl Report {
             "unhealed": self.unhealed,
             "given_up": self.given_up,
             "contacts": self.contacts,
+            "way_m": self.way_m,
             "deliveries": self.deliveries,
             "left_behind": self.left_behind,
             "took_s": self.took_s,
@@ -199,6 +214,7 @@ mod tests {
             speaks: true,
             died: Some(at(0)),
             healed: healed_ms.map(at),
+            alone: true,
             overtaken: false,
         };
         Verdict { wound, too_late: too_late.map(Duration::from_millis) }

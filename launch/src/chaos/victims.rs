@@ -53,6 +53,7 @@ pub(super) struct Scene {
     rng: Pcg64,
     last_order: Option<Time>,
     status: Option<MissionStatus>,
+    way_m: f64,
     world: Option<WorldTruth>,
     first_contacts: Option<u64>,
     tap: Tap,
@@ -120,6 +121,7 @@ impl Scene {
             rng: Pcg64::seed_from_u64(seed),
             last_order: None,
             status: None,
+            way_m: 0.0,
             world: None,
             first_contacts: None,
             tap,
@@ -163,8 +165,11 @@ impl Scene {
             Kind::Hang => send(Signal::STOP),
             Kind::Restart => _ = supervisor.restart(&role),
         }
-        for open in self.wounds.iter_mut().filter(|wound| wound.role == role && wound.healed.is_none()) {
-            open.overtaken = true;
+        let mut alone = true;
+        for open in self.wounds.iter_mut().filter(|wound| wound.healed.is_none()) {
+            open.overtaken |= open.role == role;
+            open.alone &= open.role == role;
+            alone &= open.role == role;
         }
         self.wounds.push(Wound {
             kind: deed.kind,
@@ -175,6 +180,7 @@ impl Scene {
             speaks: victim.last_message.is_some_and(|last| now.since(last) < SPEAKS_WITHIN),
             died: (deed.kind == Kind::Kill).then_some(now),
             healed: None,
+            alone,
             overtaken: false,
             role,
         });
@@ -220,6 +226,11 @@ impl Scene {
         while let Some((_, bytes)) = self.truth.as_mut().and_then(TapReader::next) {
             if let Ok(view) = View::<WorldTruth>::parse(bytes) {
                 self.first_contacts.get_or_insert(view.message.contacts);
+                let step_m = self
+                    .world
+                    .map_or(0.0, |last| (view.message.x_m - last.x_m).hypot(view.message.y_m - last.y_m));
+                // What cannot be is no way: a message of another world.
+                self.way_m += if step_m < 0.5 { step_m } else { 0.0 };
                 self.world = Some(*view.message);
             }
         }
@@ -275,6 +286,11 @@ impl Scene {
     /// How often the robot has touched something.
     pub(super) fn contacts(&self) -> Option<u64> {
         Some(self.world?.contacts.saturating_sub(self.first_contacts?))
+    }
+
+    /// How far the robot went.
+    pub(super) fn way_m(&self) -> Option<f64> {
+        self.world.map(|_| self.way_m)
     }
 
     /// Coffees delivered.

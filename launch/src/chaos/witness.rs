@@ -35,6 +35,8 @@ pub(super) struct Wound {
     pub(super) died: Option<Time>,
     /// The successor's first message, or its first step where it speaks seldom.
     pub(super) healed: Option<Time>,
+    /// Nobody else was down meanwhile, from whom it may have needed something to say anything.
+    pub(super) alone: bool,
     /// A later wound has hit the successor before it spoke.
     pub(super) overtaken: bool,
 }
@@ -106,6 +108,7 @@ mod tests {
             speaks: true,
             died: Some(at(1000)),
             healed: healed_ms.map(at),
+            alone: true,
             overtaken: false,
         }
     }

@@ -25,7 +25,8 @@ impl Cleaner {
             return Ok(());
         }
         self.again = false;
-        let child = Command::new(std::env::current_exe()?)
+        // Not by its path: the launcher's file may have been replaced since.
+        let child = Command::new("/proc/self/exe")
             .args(["clean-dead", board])
             .stdin(Stdio::null())
             .stdout(Stdio::null())
