@@ -45,8 +45,7 @@ impl Lattice {
             cells: vec![],
             begins: vec![0],
         };
-        // Half the diagonal, and a little for the rounding.
-        let within_m = cell_m * 0.5_f64.sqrt() * (1.0 + 1e-9);
+        let within_m = lattice.within_m();
         let holds: Vec<bool> =
             (0..columns * rows).map(|cell| may_hold(lattice.centre(cell), within_m)).collect();
         for cell in 0..holds.len() {
@@ -90,6 +89,59 @@ impl Lattice {
         Some(self.centre(cell as usize) + inside * self.cell_m)
     }
 
+    /// Whether two places hang together around discs of `radius_m`: again over cells that may hold a place that no disc covers.
+    pub(crate) fn may_connect(
+        &self,
+        one: Point2<f64>,
+        other: Point2<f64>,
+        discs: &[Point2<f64>],
+        radius_m: f64,
+    ) -> bool {
+        let (Some(one), Some(other)) = (self.cell_at(one), self.cell_at(other)) else { return false };
+        let mut open: Vec<bool> = self.part.iter().map(|&part| part > 0).collect();
+        let covered_m = radius_m - self.within_m();
+        let reach = Vector2::repeat(covered_m.max(0.0));
+        for disc in discs {
+            let at = |place: Point2<f64>, count: usize, axis: usize| {
+                (((place[axis] - self.low[axis]) / self.cell_m).floor().max(0.0) as usize).min(count)
+            };
+            let (low, high) = (disc - reach, disc + reach);
+            for row in at(low, self.rows, 1)..(at(high, self.rows, 1) + 1).min(self.rows) {
+                for column in at(low, self.columns, 0)..(at(high, self.columns, 0) + 1).min(self.columns) {
+                    let cell = row * self.columns + column;
+                    open[cell] &= (self.centre(cell) - disc).norm() >= covered_m;
+                }
+            }
+        }
+        let mut found = vec![one];
+        open[one] = false;
+        while let Some(cell) = found.pop() {
+            if cell == other {
+                return true;
+            }
+            for neighbour in self.around(cell) {
+                if std::mem::take(&mut open[neighbour]) {
+                    found.push(neighbour);
+                }
+            }
+        }
+        false
+    }
+
+    /// Half the diagonal of a cell, and a little for the rounding.
+    fn within_m(&self) -> f64 {
+        self.cell_m * 0.5_f64.sqrt() * (1.0 + 1e-9)
+    }
+
+    /// A cell and its neighbours over edges and corners.
+    fn around(&self, cell: usize) -> impl Iterator<Item = usize> + use<> {
+        let (columns, rows) = (self.columns, self.rows);
+        let (column, row) = (cell % columns, cell / columns);
+        (row.saturating_sub(1)..(row + 2).min(rows)).flat_map(move |row| {
+            (column.saturating_sub(1)..(column + 2).min(columns)).map(move |column| row * columns + column)
+        })
+    }
+
     fn centre(&self, cell: usize) -> Point2<f64> {
         let at = Vector2::new((cell % self.columns) as f64 + 0.5, (cell / self.columns) as f64 + 0.5);
         self.low + at * self.cell_m
@@ -103,14 +155,10 @@ impl Lattice {
         self.cells.push(cell as u32);
         while let Some(&cell) = self.cells.get(next) {
             next += 1;
-            let (column, row) = (cell as usize % self.columns, cell as usize / self.columns);
-            for row in row.saturating_sub(1)..(row + 2).min(self.rows) {
-                for column in column.saturating_sub(1)..(column + 2).min(self.columns) {
-                    let neighbour = row * self.columns + column;
-                    if holds[neighbour] && self.part[neighbour] == 0 {
-                        self.part[neighbour] = part;
-                        self.cells.push(neighbour as u32);
-                    }
+            for neighbour in self.around(cell as usize) {
+                if holds[neighbour] && self.part[neighbour] == 0 {
+                    self.part[neighbour] = part;
+                    self.cells.push(neighbour as u32);
                 }
             }
         }

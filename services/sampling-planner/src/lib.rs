@@ -53,6 +53,8 @@ struct Active {
     planned: Time,
     /// The piece of the path on which the robot is.
     piece: usize,
+    /// Draws already made for the next answer, when it was not found within one step.
+    unfinished: Option<u32>,
 }
 
 /// Where the robot is: the floor, and the pose there.
@@ -158,6 +160,9 @@ impl SamplingPlanner {
 
     /// Whether the path of a request that was answered before has to be planned again.
     fn is_due(&self, now: Time, active: &Active, pose: Option<Whereabouts>) -> bool {
+        if active.unfinished.is_some() {
+            return true;
+        }
         if active.state == PlanStateName::NoStart {
             return pose
                 .is_some_and(|(floor, _)| floor == active.request.floor && self.floor(floor).is_some());
@@ -203,32 +208,25 @@ impl SamplingPlanner {
     }
 
     fn plan(&mut self, now: Time, request: PlanRequest, pose: Option<Whereabouts>) -> Outputs<'_> {
-        let known = self.floors.iter().find(|floor| floor.number == request.floor);
-        let start = pose.filter(|(floor, _)| *floor == request.floor);
-        let numbers = [request.goal_x_m, request.goal_y_m, request.tolerance_m];
-        let state = match (known, start) {
-            _ if numbers.iter().any(|number| !number.is_finite()) => PlanStateName::InvalidGoal,
-            (Some(floor), Some((_, pose))) => {
-                let question = Question {
-                    start: pose.position(),
-                    goal: Point2::new(request.goal_x_m, request.goal_y_m),
-                    tolerance_m: request.tolerance_m.clamp(0.0, 2.0),
-                    escape_m: self.params.escape_m,
-                    samples: [self.params.samples, self.params.samples_max],
-                    tries_max: self.params.tries_max,
-                    literal: self.params.literal,
-                };
-                let obstacles = self.obstacles.places();
-                let view = View::new(&floor.space, obstacles, self.params.obstacle_distance_m());
-                self.router.plan(&view, &question, &mut self.rng)
-            }
-            _ => PlanStateName::NoStart,
-        };
         let before = self.active.filter(|active| same(&active.request, &request));
+        let first = before.and_then(|before| before.unfinished).unwrap_or(0);
+        let Some(state) = self.search(&request, pose, first) else {
+            let unfinished = Some(self.router.tries());
+            let blank = Active {
+                request,
+                state: PlanStateName::Idle,
+                revision: 0,
+                planned: now,
+                piece: 0,
+                unfinished: None,
+            };
+            self.active = Some(Active { unfinished, ..before.unwrap_or(blank) });
+            return Outputs { path: None };
+        };
         // A goal that stays out of reach is said once.
         let news = state == PlanStateName::Found || before.is_none_or(|before| before.state != state);
         let revision = before.map_or(0, |before| before.revision) + u64::from(news);
-        self.active = Some(Active { request, state, revision, planned: now, piece: 0 });
+        self.active = Some(Active { request, state, revision, planned: now, piece: 0, unfinished: None });
         let waypoints = if state == PlanStateName::Found { self.router.waypoints() } else { &[] };
         let path = Path {
             request_id: request.request_id,
@@ -239,6 +237,34 @@ impl SamplingPlanner {
             state: PlanState::from(state),
         };
         Outputs { path: news.then_some((path, waypoints)) }
+    }
+
+    /// One step's part of the search, from draw number `first` on; `None` when it has to go on.
+    fn search(
+        &mut self,
+        request: &PlanRequest,
+        pose: Option<Whereabouts>,
+        first: u32,
+    ) -> Option<PlanStateName> {
+        let numbers = [request.goal_x_m, request.goal_y_m, request.tolerance_m];
+        if numbers.iter().any(|number| !number.is_finite()) {
+            return Some(PlanStateName::InvalidGoal);
+        }
+        let floor = self.floors.iter().find(|floor| floor.number == request.floor);
+        let start = pose.filter(|(floor, _)| *floor == request.floor);
+        let (Some(floor), Some((_, pose))) = (floor, start) else { return Some(PlanStateName::NoStart) };
+        let question = Question {
+            start: pose.position(),
+            goal: Point2::new(request.goal_x_m, request.goal_y_m),
+            tolerance_m: request.tolerance_m.clamp(0.0, 2.0),
+            escape_m: self.params.escape_m,
+            samples: [self.params.samples, self.params.samples_max],
+            tries_max: self.params.tries_max,
+            literal: self.params.literal,
+        };
+        let obstacles = self.obstacles.places();
+        let view = View::new(&floor.space, obstacles, self.params.obstacle_distance_m());
+        self.router.plan_some(&view, &question, first, self.params.samples_max, &mut self.rng)
     }
 }
 

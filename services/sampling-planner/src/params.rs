@@ -18,7 +18,7 @@ pub struct Params {
     /// Waypoints to choose from in the first draw (NXT-071).
     #[schemars(range(min = 1, max = 10_000))]
     pub samples: u32,
-    /// Each further draw has twice as many as the one before, up to this (NXT-081).
+    /// Each further draw has twice as many as the one before, up to this (NXT-081). No step draws more: a search may take several steps.
     #[schemars(range(min = 1, max = 10_000))]
     pub samples_max: u32,
     /// Draws until a goal counts as unreachable.
@@ -73,7 +73,7 @@ impl Default for Params {
             world: String::new(),
             robot_radius_m: 0.08,
             samples: 30,
-            samples_max: 1920,
+            samples_max: 960,
             tries_max: 20,
             literal: false,
             obstacle_margin_m: 0.05,

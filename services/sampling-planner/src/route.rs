@@ -32,6 +32,15 @@ pub struct Question {
     pub literal: bool,
 }
 
+impl Question {
+    /// Samples of a draw, counted from 0: N, 2 N, 4 N .. up to the most.
+    fn samples_in(&self, draw: u32) -> u32 {
+        let [first, most] = self.samples;
+        let grown = u64::from(first) << draw.min(32);
+        u32::try_from(grown).unwrap_or(most).min(most)
+    }
+}
+
 /// Plans, and keeps its memory for the next time.
 #[derive(Debug, Clone, Default)]
 pub struct Router {
@@ -45,30 +54,36 @@ pub struct Router {
 impl Router {
     /// Finds a way. Only `Found` leaves waypoints; the first is the start, the last the goal or the free place next to it.
     pub fn plan(&mut self, view: &View<'_>, question: &Question, rng: &mut impl Rng) -> PlanStateName {
+        self.plan_some(view, question, 0, u32::MAX, rng).unwrap_or(PlanStateName::Unreachable)
+    }
+
+    /// The same in portions: begins with draw number `first`, and gives up for now, with `None`, before it has drawn more than `budget`
+    /// samples, one draw excepted. [`Router::tries`] says where to go on.
+    pub fn plan_some(
+        &mut self,
+        view: &View<'_>,
+        question: &Question,
+        first: u32,
+        budget: u32,
+        rng: &mut impl Rng,
+    ) -> Option<PlanStateName> {
         self.waypoints.clear();
         self.samples.clear();
-        (self.expanded, self.tries) = (0, 0);
-        let space = view.space();
-        if !space.covers(question.start) {
-            return PlanStateName::NoStart;
-        }
-        if !space.covers(question.goal) {
-            return PlanStateName::InvalidGoal;
-        }
-        let Some(goal) = nearest_free(view, question.goal, question.tolerance_m, false) else {
-            return PlanStateName::InvalidGoal;
+        self.expanded = if first == 0 { 0 } else { self.expanded };
+        self.tries = first;
+        let [start, goal] = match ends(view, question) {
+            Ok(ends) => ends,
+            Err(state) => return Some(state),
         };
-        let Some(start) = nearest_free(view, question.start, question.escape_m, true) else {
-            return PlanStateName::Unreachable;
-        };
-        if !space.may_connect(start, goal) {
-            return PlanStateName::Unreachable;
-        }
-        let [first, most] = question.samples;
+        let mut left = budget;
         while self.tries < question.tries_max {
-            let wanted = first.checked_shl(self.tries).filter(|wanted| wanted >> self.tries == first);
+            let wanted = question.samples_in(self.tries);
+            if left < wanted && left < budget {
+                return None;
+            }
+            left = left.saturating_sub(wanted);
             self.tries += 1;
-            self.draw(view, start, wanted.unwrap_or(most).min(most), rng);
+            self.draw(view, start, wanted, rng);
             let is_open = |from, to| view.is_open(from, to);
             let found = self.search.find([start, goal], &self.samples, question.literal, is_open);
             self.expanded += self.search.expanded();
@@ -77,10 +92,13 @@ impl Router {
                 let chosen = self.search.chosen().iter().map(|&index| self.samples[index]);
                 let places = escaped.into_iter().chain([start]).chain(chosen).chain([goal]);
                 self.waypoints.extend(places.map(|place| Waypoint { x_m: place.x, y_m: place.y }));
-                return PlanStateName::Found;
+                return Some(PlanStateName::Found);
+            }
+            if self.tries == first + 1 && !view.may_connect(start, goal) {
+                return Some(PlanStateName::Unreachable);
             }
         }
-        PlanStateName::Unreachable
+        Some(PlanStateName::Unreachable)
     }
 
     /// The way found last.
@@ -124,6 +142,22 @@ impl Router {
 /// Length of a chain of waypoints.
 pub fn length_m(waypoints: &[Waypoint]) -> f64 {
     waypoints.windows(2).map(|ends| (ends[1].x_m - ends[0].x_m).hypot(ends[1].y_m - ends[0].y_m)).sum()
+}
+
+/// Where the way begins and ends, as free places that may be connected, or why there is none.
+fn ends(view: &View<'_>, question: &Question) -> Result<[Point2<f64>; 2], PlanStateName> {
+    let space = view.space();
+    if !space.covers(question.start) {
+        return Err(PlanStateName::NoStart);
+    }
+    if !space.covers(question.goal) {
+        return Err(PlanStateName::InvalidGoal);
+    }
+    let goal = nearest_free(view, question.goal, question.tolerance_m, false);
+    let goal = goal.ok_or(PlanStateName::InvalidGoal)?;
+    let start = nearest_free(view, question.start, question.escape_m, true);
+    let start = start.ok_or(PlanStateName::Unreachable)?;
+    if space.may_connect(start, goal) { Ok([start, goal]) } else { Err(PlanStateName::Unreachable) }
 }
 
 /// The place itself when it is free, else a free one nearby, the nearest of those tried. An escape does not cross a wall, unless the

@@ -124,12 +124,29 @@ impl<'a> View<'a> {
         self.space
     }
 
+    /// The obstacles observed.
+    pub fn obstacles(&self) -> &'a [Point2<f64>] {
+        self.obstacles
+    }
+
+    /// The distance at which they are passed.
+    pub fn obstacle_m(&self) -> f64 {
+        self.obstacle_m
+    }
+
     /// Whether the robot's middle may be there.
     pub fn is_free(&self, place: Point2<f64>) -> bool {
         let space = self.space;
         space.outline.as_ref().is_none_or(|outline| outline.contains(place))
             && space.is_clear(place, space.offset_m)
             && self.obstacles.iter().all(|obstacle| (obstacle - place).norm() >= self.obstacle_m)
+    }
+
+    /// Whether a way between two places can exist in spite of the obstacles. `false` is certain, `true` is not.
+    pub fn may_connect(&self, one: Point2<f64>, other: Point2<f64>) -> bool {
+        self.space.may_connect(one, other)
+            && (self.obstacles.is_empty()
+                || self.space.lattice.may_connect(one, other, self.obstacles, self.obstacle_m))
     }
 
     /// Whether the robot may drive straight from one free place to another: the distance to every wall is at least the offset.

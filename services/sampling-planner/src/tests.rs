@@ -296,12 +296,11 @@ fn more_draws_find_what_the_first_misses() {
         let space = space(name, 0.08);
         let view = View::new(&space, &[], 0.0);
         let mut router = Router::default();
-        let question = Question { samples: [30, 1920], tries_max: 20, ..question(start, goal) };
+        let question = Question { samples: [30, 960], tries_max: 20, ..question(start, goal) };
         for seed in 0..100 {
             let state = router.plan(&view, &question, &mut Pcg64::seed_from_u64(seed));
             assert_eq!(state, PlanStateName::Found, "{name}, seed {seed}");
-            let drawn = 30 << (router.tries() - 1);
-            assert_eq!(router.samples().len(), drawn, "the draws double");
+            assert_eq!(router.samples().len(), 30 << (router.tries() - 1), "the draws double");
         }
     }
 }
@@ -396,6 +395,50 @@ fn a_goal_in_another_part_is_unreachable_at_once() {
     let question = Question { tries_max: 20, ..question([0.5, 0.5], [1.5, 0.5]) };
     let state = router.plan(&view, &question, &mut Pcg64::seed_from_u64(1));
     assert_eq!((state, router.tries()), (PlanStateName::Unreachable, 0));
+}
+
+#[test]
+fn a_floor_shut_by_obstacles_is_unreachable_after_one_draw() {
+    let space = space("default", 0.08);
+    let shut: Vec<Point2<f64>> = (0..10).map(|at| Point2::new(0.05 * f64::from(at), 0.52)).collect();
+    let view = View::new(&space, &shut, 0.08);
+    let mut router = Router::default();
+    let question = Question { tries_max: 20, ..question([0.3, 0.2], [0.8, 0.8]) };
+    let state = router.plan(&view, &question, &mut Pcg64::seed_from_u64(1));
+    assert_eq!((state, router.tries()), (PlanStateName::Unreachable, 1));
+    // A gap is found, if not always at once.
+    let gap: Vec<_> = shut.into_iter().filter(|place| (place.x - 0.225).abs() > 0.1).collect();
+    let view = View::new(&space, &gap, 0.08);
+    let question = Question { samples: [5, 640], ..question };
+    let tries = (0..20).map(|seed| {
+        let state = router.plan(&view, &question, &mut Pcg64::seed_from_u64(seed));
+        assert_eq!(state, PlanStateName::Found, "seed {seed}");
+        router.tries()
+    });
+    assert!(tries.max() > Some(1));
+}
+
+#[test]
+fn a_long_search_goes_on_in_the_next_step() {
+    // Five samples hardly ever pass the third arena, and each step draws no more than five.
+    let params = Params { samples: 5, samples_max: 5, ..Params::default() };
+    let mut planner = SamplingPlanner::in_world(params, &arena("repeated"), 3).unwrap();
+    let (goal, pose) = (request(1, [2.3, 0.7]), estimate(0.5, 0.7));
+    let answers: Vec<_> =
+        (0..30).map(|tenths| step(&mut planner, 1.0 + 0.1 * f64::from(tenths), &goal, &pose)).collect();
+    let answered = answers.iter().position(Option::is_some).expect("an answer");
+    assert!((1..20).contains(&answered), "after {answered} steps");
+    assert!(answers[answered].as_ref().is_some_and(|(path, _)| (path.request_id, path.revision) == (1, 1)));
+    let mut portions = Router::default();
+    let world = arena("repeated");
+    let space = SamplingPlanner::in_world(Params::default(), &world, 1).unwrap();
+    let view = View::new(space.space(1).unwrap(), &[], 0.0);
+    let question = Question { samples: [4, 4], tries_max: 3, ..question([0.5, 0.7], [2.3, 0.7]) };
+    let mut rng = Pcg64::seed_from_u64(1);
+    for (first, expected) in [(0, None), (1, None), (2, Some(PlanStateName::Unreachable))] {
+        assert_eq!(portions.plan_some(&view, &question, first, 4, &mut rng), expected);
+        assert_eq!(portions.tries(), first + 1);
+    }
 }
 
 #[test]
