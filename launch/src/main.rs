@@ -7,11 +7,17 @@ mod conductor;
 mod control;
 mod detach;
 mod experiment;
+mod faults;
 mod graph;
 mod lockstep;
 mod monitor;
+mod notes;
 mod observer;
 mod plain;
+mod play;
+mod prompter;
+mod rerun;
+mod steering;
 mod summary;
 mod supervise;
 mod up;
@@ -39,6 +45,7 @@ fn main() -> ExitCode {
             Ok(code) => code,
             Err(error) => commands::finish(Err(error)),
         },
+        Command::Rerun(args) => rerun::command(&args),
         Command::Completions { shell } => {
             cli::print_completions(shell);
             ExitCode::SUCCESS
@@ -63,11 +70,16 @@ fn up_command(args: &UpArgs) -> ExitCode {
     if args.lockstep {
         let pace = lockstep::Pace {
             speed: args.speed,
-            until_s: args.until,
+            until: args.until.map(messages::Time::from_secs_f64),
             cpu: args.cpu,
             record: args.record.clone(),
+            steered: args.steered,
+            ..lockstep::Pace::default()
         };
         return lockstep::up(&graph, &options, &pace, &mut lines);
+    }
+    if !graph.faults.is_empty() {
+        eprintln!("the faults of the graph happen in logical time only: with --lockstep");
     }
     let on_terminal = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
     if on_terminal && !args.plain && !args.no_view {

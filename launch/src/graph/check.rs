@@ -1,5 +1,7 @@
 //! Whether a graph can run: every binary's word against the graph's.
 
+use super::faults::Fault;
+use super::file::Overrides;
 use super::problem::{Problem, Problems};
 use super::schema::Schema;
 use super::settings::{Graph, LaunchSettings, ServiceTable, ViewSettings};
@@ -61,6 +63,14 @@ pub(crate) struct Checked {
     pub(crate) services: Vec<CheckedService>,
     /// The topics, in the order of their names.
     pub(crate) topics: Vec<CheckedTopic>,
+    /// What is done to services at logical moments.
+    pub(crate) faults: Vec<Fault>,
+    /// The graph as text, before the command line changed anything.
+    #[serde(skip)]
+    pub(crate) text: String,
+    /// What the command line changed.
+    #[serde(skip)]
+    pub(crate) overrides: Overrides,
 }
 
 /// A service that can run.
@@ -185,6 +195,9 @@ pub(crate) fn check(
         view: graph.view.clone(),
         services: services.collect(),
         topics,
+        faults: graph.faults.clone(),
+        text: graph.text.clone(),
+        overrides: Overrides::default(),
     })
 }
 
