@@ -196,7 +196,7 @@ pub(crate) fn read_graph(
         services: Vec::new(),
         text: String::new(),
     };
-    let mut faults = None;
+    let (mut faults, mut other_faults) = (None, None);
     let mut name_place = Place::top(source);
     for entry in &table.entries {
         if entry.key == "fault" && entry.value.table().is_none() {
@@ -210,14 +210,14 @@ pub(crate) fn read_graph(
             continue;
         };
         if entry.key == "graph" {
-            // Those of the command line replace those of the file.
-            faults = content.get("fault").or(faults);
+            other_faults = content.get("fault");
             read_graph_table(&mut graph, &mut name_place, content, problems);
         } else {
             graph.services.push(read_service(entry, content, problems));
         }
     }
-    if let Some(entry) = faults {
+    // Those that an experiment or the command line sets replace those of the file.
+    if let Some(entry) = other_faults.or(faults) {
         let roles: Vec<&str> = graph.services.iter().map(|service| service.role.as_str()).collect();
         graph.faults = read_faults(entry, &roles, problems);
     }
