@@ -23,7 +23,6 @@ const ROOM: usize = 4096;
 const HEADER: usize = 64;
 
 /// A state of a service that its successor takes over: after a crash, or in a swap.
-#[derive(Debug)]
 pub struct Kept<S> {
     home: Option<Home>,
     page: Option<Page>,
@@ -35,11 +34,18 @@ pub struct Kept<S> {
 }
 
 /// Where the state lies, and the topic whose generation says who plays the role.
-#[derive(Debug)]
 pub(crate) struct Home {
     pub(crate) file: PathBuf,
     pub(crate) shared: Rc<Shared>,
     pub(crate) health: u32,
+}
+
+impl<S> std::fmt::Debug for Kept<S> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Kept")
+            .field("file", &self.home.as_ref().map(|home| &home.file))
+            .finish_non_exhaustive()
+    }
 }
 
 impl Home {

@@ -8,6 +8,9 @@ use std::rc::Rc;
 use std::sync::atomic::Ordering;
 use zerocopy::FromBytes as _;
 
+/// Lockstep: the round of messages from outside. They are published between two instants, and seen from the next one on.
+pub const OUTSIDE_ROUND: u32 = u32::MAX;
+
 /// A port that reads a topic.
 pub trait Reader {
     /// The topic's name.
@@ -242,18 +245,36 @@ impl PublisherLink {
         stamp: Time,
         origin: Time,
     ) -> Result<(), TransportError> {
-        if self.is_heard() {
-            self.send_in_generation(loan, stamp, origin, self.shared.generation)
-        } else {
-            Ok(())
+        if !self.is_heard() {
+            return Ok(());
         }
+        if self.shared.computes.get() {
+            self.hold(loan, origin);
+            return Ok(());
+        }
+        self.send_in_generation(loan, stamp, origin, self.shared.generation)
     }
 
-    /// For tools: in the name of whoever publishes the topic.
+    /// Keeps a message until its step has been computed. A copy, since the transport lends each publisher few places at once.
+    fn hold(&self, mut loan: RawLoan, origin: Time) {
+        let bytes = loan.bytes().to_vec();
+        let publisher = Rc::clone(&self.publisher);
+        self.shared.held.borrow_mut().push(Held { topic: self.topic, publisher, bytes, origin });
+    }
+
+    /// For tools: in the name of whoever publishes the topic. In lockstep after the last round of the present instant.
     pub(crate) fn send_as_outsider(&self, loan: RawLoan, stamp: Time) -> Result<(), TransportError> {
-        let entry = self.shared.switchboard.topic(self.topic);
-        let generation = entry.map_or(0, |entry| entry.generation.load(Ordering::Acquire));
-        self.send_in_generation(loan, stamp, stamp, generation)
+        let Some(entry) = self.shared.switchboard.topic(self.topic) else { return Ok(()) };
+        self.send_as(
+            loan,
+            Envelope {
+                stamp_ns: stamp.as_nanos(),
+                origin_ns: stamp.as_nanos(),
+                sequence: entry.count.load(Ordering::Relaxed).wrapping_add(1),
+                generation: entry.generation.load(Ordering::Acquire),
+                round: if self.shared.lockstep { OUTSIDE_ROUND } else { 0 },
+            },
+        )
     }
 
     fn send_in_generation(
@@ -265,20 +286,52 @@ impl PublisherLink {
     ) -> Result<(), TransportError> {
         let Some(entry) = self.shared.switchboard.topic(self.topic) else { return Ok(()) };
         let sequence = entry.count.load(Ordering::Relaxed).wrapping_add(1);
-        loan.send(Envelope {
-            stamp_ns: stamp.as_nanos(),
-            origin_ns: origin.as_nanos(),
-            sequence,
-            generation,
-            round: self.shared.round(),
-        })?;
-        entry.last_stamp_ns.store(stamp.as_nanos(), Ordering::Relaxed);
-        entry.count.store(sequence, Ordering::Release);
+        self.send_as(
+            loan,
+            Envelope {
+                stamp_ns: stamp.as_nanos(),
+                origin_ns: origin.as_nanos(),
+                sequence,
+                generation,
+                round: self.shared.round(),
+            },
+        )
+    }
+
+    /// With all that lies in front of it given.
+    pub(crate) fn send_as(&self, loan: RawLoan, envelope: Envelope) -> Result<(), TransportError> {
+        let Some(entry) = self.shared.switchboard.topic(self.topic) else { return Ok(()) };
+        loan.send(envelope)?;
+        entry.last_stamp_ns.store(envelope.stamp_ns, Ordering::Relaxed);
+        entry.count.store(envelope.sequence, Ordering::Release);
         // In lockstep the conductor says whose turn it is.
         if !self.shared.lockstep {
             self.shared.switchboard.ring_readers(self.topic);
         }
         Ok(())
+    }
+}
+
+/// A message of a step that is still being computed.
+pub(crate) struct Held {
+    topic: u32,
+    publisher: Rc<RawPublisher>,
+    bytes: Vec<u8>,
+    origin: Time,
+}
+
+/// Publishes what was held back while the step was computed, in the moment that [`Shared::begin_step`] has set.
+pub(crate) fn release_held(shared: &Rc<Shared>) {
+    let held = std::mem::take(&mut *shared.held.borrow_mut());
+    for Held { topic, publisher, bytes, origin } in held {
+        let link = PublisherLink { shared: Rc::clone(shared), topic, publisher, measures: false };
+        let sent = link.loan(bytes.len()).and_then(|mut loan| {
+            loan.bytes().copy_from_slice(&bytes);
+            link.send_in_generation(loan, shared.clock(), origin, shared.generation)
+        });
+        if let Err(error) = sent {
+            tracing::error!(topic, %error, "message lost");
+        }
     }
 }
 

@@ -7,9 +7,9 @@ use crate::host;
 use crate::interface::{About, Interface};
 use crate::node::{JoinError, Joined, Node};
 use crate::place::Place;
-use crate::port::{PublisherLink, bytes_of};
+use crate::port::{PublisherLink, bytes_of, release_held};
 use crate::shared::Shared;
-use crate::switchboard::{self, SlotState};
+use crate::switchboard::{self, Slot, SlotState};
 use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
 use messages::{Health, Message as _, Parameters, ServiceState, Time};
 use std::error::Error;
@@ -99,6 +99,7 @@ fn command(about: About) -> Command {
                 .hide(true)
                 .help("Publish beside the topics of the role, to be compared"),
         )
+        .arg(text("compute-ns", "N", "In lockstep: how long a step takes").value_parser(value_parser!(u64)).hide(true))
         .arg(text("cpu", "N", "Run on this processor only").value_parser(value_parser!(usize)).action(ArgAction::Append))
         .arg(text("fifo", "PRIORITY", "Real-time priority, 1 to 99").value_parser(value_parser!(i32).range(1..=99)))
         .arg(
@@ -181,6 +182,7 @@ fn serve(
         late_steps: 0,
         health,
     };
+    shared.computes.set(shared.lockstep && arguments.get_one::<u64>("compute-ns").is_some_and(|&ns| ns > 0));
     for &(topic, _) in &service.wakes {
         if let Some(entry) = shared.switchboard.topic(topic) {
             entry.set_wake(shared.slot, true);
@@ -276,6 +278,7 @@ impl Service {
         let Some(slot) = shared.own_slot() else { return };
         let header = shared.switchboard.header();
         let mut turn = slot.done.load(Ordering::Acquire);
+        let mut computing = false;
         slot.next_due_ns.store(0, Ordering::Release);
         slot.set_state(SlotState::Running);
         switchboard::ring(&header.conductor_bell, &header.conductor_sleeps);
@@ -283,6 +286,7 @@ impl Service {
             let heard = slot.bell();
             let given = slot.turn.load(Ordering::Acquire);
             if given == turn {
+                self.serve_new_readers();
                 slot.wait(heard, Some(HEARTBEAT));
                 continue;
             }
@@ -290,21 +294,33 @@ impl Service {
             let now = Time::from_nanos(header.logical_ns.load(Ordering::Acquire));
             let round = header.round.load(Ordering::Acquire);
             self.serve_new_readers();
-            self.take_step(now, round);
-            if let Some(period) = self.period
-                && slot.next_due_ns.load(Ordering::Relaxed) <= now.as_nanos()
-            {
-                let period = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX).max(1);
-                slot.next_due_ns
-                    .store((now.as_nanos() / period + 1).saturating_mul(period), Ordering::Release);
-            } else if self.period.is_none() {
-                slot.next_due_ns.store(u64::MAX, Ordering::Release);
+            // On a slow computer the turn after a step is that in which its messages are seen.
+            if std::mem::take(&mut computing) {
+                shared.begin_step(now, round);
+                release_held(&shared);
+            } else {
+                self.take_step(now, round);
+                self.set_timer(slot, now);
+                computing = shared.computes.get();
             }
             slot.steps.store(self.steps, Ordering::Relaxed);
             slot.done.store(turn, Ordering::Release);
             if header.outstanding.fetch_sub(1, Ordering::AcqRel) == 1 {
                 switchboard::ring(&header.conductor_bell, &header.conductor_sleeps);
             }
+        }
+        // A step that was not computed to its end has published nothing, and its ports must close.
+        shared.held.borrow_mut().clear();
+    }
+
+    fn set_timer(&self, slot: &Slot, now: Time) {
+        if let Some(period) = self.period
+            && slot.next_due_ns.load(Ordering::Relaxed) <= now.as_nanos()
+        {
+            let period = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX).max(1);
+            slot.next_due_ns.store((now.as_nanos() / period + 1).saturating_mul(period), Ordering::Release);
+        } else if self.period.is_none() {
+            slot.next_due_ns.store(u64::MAX, Ordering::Release);
         }
     }
 
@@ -348,6 +364,9 @@ impl Service {
             self.topology = topology;
             for link in &self.publishers {
                 link.publisher.update();
+            }
+            if let Some(slot) = self.shared.own_slot() {
+                slot.served.store(topology, Ordering::Release);
             }
         }
     }

@@ -74,7 +74,8 @@ pub struct Header {
     pub conductor_sleeps: AtomicU32,
     /// The next generation number of a publisher.
     pub generations: AtomicU32,
-    reserved: AtomicU32,
+    /// Lockstep: who may publish from outside, and when; see [`gate`](crate::gate).
+    pub gate: AtomicU32,
 }
 
 /// One process.
@@ -97,6 +98,8 @@ pub struct Slot {
     pub done: AtomicU32,
     /// 1 when this is a service of the graph, 0 for a tool.
     pub is_service: AtomicU32,
+    /// The topology up to which it has served the readers that joined.
+    pub served: AtomicU32,
     /// When it last looked about, in nanoseconds of the host's clock.
     pub heartbeat_ns: AtomicU64,
     /// When its present step began; zero between steps.
@@ -363,6 +366,7 @@ impl Slot {
         self.may_take_over.store(0, Ordering::Relaxed);
         self.next_due_ns.store(u64::MAX, Ordering::Relaxed);
         self.sleeps.store(0, Ordering::Relaxed);
+        self.served.store(0, Ordering::Relaxed);
         self.done.store(self.turn.load(Ordering::Relaxed), Ordering::Relaxed);
         self.state.store(SlotState::Starting as u32, Ordering::Release);
     }

@@ -11,6 +11,7 @@ Examples:
   launch up coffee --swap planner=sampling-planner --seed 7
   launch up coffee --set collision-avoidance.front_radius_m=0.25 --detach
   launch experiment coffee                         many runs, with statistics and plots
+  launch rerun a.mcap                              does a recorded run come out the same?
   launch order 207                                 coffee for room 207, please
   launch swap controller=window-controller         while it drives
   launch logs planner -f                           follow what the planner says
@@ -87,6 +88,9 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Run a recording again: the same graph, or single services on the recorded inputs, and compare
+    #[command(after_help = RERUN_HELP)]
+    Rerun(RerunArgs),
     /// Print completions for a shell
     #[command(
         after_help = "Example:\n  launch completions bash > ~/.local/share/bash-completion/completions/launch"
@@ -149,6 +153,21 @@ Examples:
   launch swap planner=sampling-planner --set robot_radius_m=0.32
   launch swap controller=window-controller --shadow --for 30
   launch swap --back controller";
+
+const RERUN_HELP: &str = "\
+Without a change the whole graph runs again, with the recorded seed and whatever came from outside: every message must be the same.
+With --with or --set only the services named there run, and --only adds more; everything that they read comes from the recording, in the very
+instants in which it was said (open loop). What they answer is compared with what was answered then, but does not act upon the world.
+With --closed the whole graph runs anew with the change, so that the change acts upon everything that follows.
+
+Exit code: 0 the same, 1 different, 2 not run.
+
+Examples:
+  launch up coffee --lockstep --seed 7 --record a.mcap
+  launch rerun a.mcap                                     is it the same again?
+  launch rerun a.mcap --only planner                      the planner alone, on the recorded inputs
+  launch rerun a.mcap --with controller=window-controller what would this one have done?
+  launch rerun a.mcap --set controller.track_m=0.42 --closed --record b.mcap";
 
 /// Which graph, and what is different about it this time.
 #[derive(Debug, Clone, Args)]
@@ -242,12 +261,50 @@ pub(crate) struct UpArgs {
     /// In lockstep: record every message into this file (MCAP)
     #[arg(long, value_name = "FILE.mcap", requires = "lockstep", value_hint = clap::ValueHint::FilePath)]
     pub(crate) record: Option<PathBuf>,
+    /// In lockstep: go on only when told to, by lines on the standard input (`advance SECONDS`, `look`, `kill ROLE`, `end`); for tests
+    #[arg(long, requires = "lockstep", hide = true)]
+    pub(crate) steered: bool,
     /// Print the referee's figures as JSON at the end
     #[arg(long)]
     pub(crate) json: bool,
     /// Where the logs of the services go
     #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
     pub(crate) log_dir: Option<PathBuf>,
+}
+
+/// `launch rerun`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RerunArgs {
+    /// The recording, made with `launch up --lockstep --record`
+    #[arg(value_name = "FILE.mcap", value_hint = clap::ValueHint::FilePath)]
+    pub(crate) file: PathBuf,
+    /// Let another binary play a role; any number of times
+    #[arg(long, value_name = "ROLE=BINARY")]
+    pub(crate) with: Vec<String>,
+    /// Give a parameter another value; any number of times
+    #[arg(long, value_name = "ROLE.KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Run this service on the recorded inputs, also if nothing about it has changed; any number of times
+    #[arg(long, value_name = "ROLE", conflicts_with = "closed")]
+    pub(crate) only: Vec<String>,
+    /// Run the whole graph, so that a change acts upon everything that follows
+    #[arg(long)]
+    pub(crate) closed: bool,
+    /// Take this graph instead of the recorded one
+    #[arg(long, value_name = "GRAPH")]
+    pub(crate) graph: Option<String>,
+    /// Record the rerun
+    #[arg(long, value_name = "OUT.mcap", value_hint = clap::ValueHint::FilePath)]
+    pub(crate) record: Option<PathBuf>,
+    /// Name the board otherwise than `rerun-PROCESS`
+    #[arg(long, value_name = "NAME")]
+    pub(crate) board: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// In a source checkout: use what is built already
+    #[arg(long)]
+    pub(crate) no_build: bool,
 }
 
 /// `launch ps` and `launch top`.

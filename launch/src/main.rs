@@ -8,13 +8,19 @@ mod conductor;
 mod control;
 mod detach;
 mod experiment;
+mod faults;
 mod graph;
 mod lockstep;
 mod monitor;
 mod new;
+mod notes;
 mod observer;
 mod plain;
+mod play;
+mod prompter;
+mod rerun;
 mod shadow;
+mod steering;
 mod summary;
 mod supervise;
 mod swap;
@@ -46,6 +52,7 @@ fn main() -> ExitCode {
             Ok(code) => code,
             Err(error) => commands::finish(Err(error)),
         },
+        Command::Rerun(args) => rerun::command(&args),
         Command::Completions { shell } => {
             cli::print_completions(shell);
             ExitCode::SUCCESS
@@ -70,11 +77,16 @@ fn up_command(args: &UpArgs) -> ExitCode {
     if args.lockstep {
         let pace = lockstep::Pace {
             speed: args.speed,
-            until_s: args.until,
+            until: args.until.map(messages::Time::from_secs_f64),
             cpu: args.cpu,
             record: args.record.clone(),
+            steered: args.steered,
+            ..lockstep::Pace::default()
         };
         return lockstep::up(&graph, &options, &pace, &mut lines);
+    }
+    if !graph.faults.is_empty() {
+        eprintln!("the faults of the graph happen in logical time only: with --lockstep");
     }
     let on_terminal = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
     if on_terminal && !args.plain && !args.no_view {

@@ -184,9 +184,7 @@ impl Supervisor {
             }
         }
         self.see_off(now);
-        if let Err(error) = self.cleaner.tend(self.host.place().name(), now) {
-            self.note("", format!("cleaning up after the dead: {error}"), true);
-        }
+        self.tend_cleaner(now);
     }
 
     /// When `tick` is due at the latest.
@@ -236,6 +234,53 @@ impl Supervisor {
         // A process that leaves when asked ends without an error; it is to come back all the same.
         service.phase = if service.process.is_some() { Phase::Waiting } else { service.phase };
         true
+    }
+
+    /// Kills a service, waits for its end and cleans up after it: for logical time, which stands still meanwhile.
+    pub(crate) fn end_at_once(&mut self, role: &str) {
+        let Some(service) = self.services.iter_mut().find(|service| service.service.role == role) else {
+            return;
+        };
+        service.phase = Phase::Waiting;
+        if let Some(mut process) = service.process.take() {
+            process.signal(Signal::KILL);
+            process.wait();
+            self.host.switchboard().release(process.slot);
+        }
+        self.clean();
+        while self.cleaner.is_busy() {
+            clock::sleep(Duration::from_millis(1));
+            self.tend_cleaner(clock::monotonic());
+        }
+    }
+
+    /// Starts a service again that was ended so, and waits until it has joined and has the last message of every topic that it reads.
+    ///
+    /// # Errors
+    /// When it does not join.
+    pub(crate) fn begin_again(&mut self, role: &str) -> Result<(), String> {
+        let Some(index) = self.services.iter().position(|service| service.service.role == role) else {
+            return Ok(());
+        };
+        self.services[index].restarts += 1;
+        self.start(index);
+        let deadline = clock::monotonic().after(START_LIMIT);
+        while self.services[index].phase != Phase::Running || !self.have_served() {
+            self.tick();
+            if self.services[index].phase == Phase::Failed || clock::monotonic() > deadline {
+                return Err(format!("`{role}` does not come back"));
+            }
+            clock::sleep(Duration::from_micros(200));
+        }
+        Ok(())
+    }
+
+    /// Whether every service has given the readers that have joined its last message.
+    fn have_served(&self) -> bool {
+        let board = self.host.switchboard();
+        let topology = board.header().topology.load(Ordering::Acquire);
+        let slots = self.services.iter().filter_map(|service| board.slot(service.slot()?));
+        slots.into_iter().all(|slot| slot.served.load(Ordering::Acquire) == topology)
     }
 
     /// Notes an event.
@@ -387,19 +432,15 @@ impl Supervisor {
         }
         service.failures = if was_sound { 1 } else { service.failures + 1 };
         let failures = service.failures;
-        let policy = service.service.launch.restart;
+        // In logical time a death that nobody planned ends the run.
+        let lockstep = self.host.switchboard().header().lockstep.load(Ordering::Relaxed) != 0;
+        let policy = service.service.launch.restart.filter(|_| !lockstep);
         let setup = status.code() == Some(i32::from(EXIT_SETUP));
         let how = death(status);
         let next = match policy {
             None => Err("it is not to be restarted".to_owned()),
             Some(_) if setup => Err("its set-up is wrong".to_owned()),
-            Some(policy) if failures > policy.give_up_after => Err(format!("{failures} deaths in a row")),
-            // The first restart is immediate.
-            Some(_) if failures <= 1 => Ok(Duration::ZERO),
-            Some(policy) => {
-                let doublings = (failures - 2).min(20);
-                Ok((policy.backoff_min * 2_u32.pow(doublings)).min(policy.backoff_max))
-            }
+            Some(policy) => policy.pause_after(failures).ok_or_else(|| format!("{failures} deaths in a row")),
         };
         service.died_at.get_or_insert(now);
         match next {
@@ -442,6 +483,12 @@ impl Supervisor {
         process.signal(Signal::KILL);
         let role = service.service.role.clone();
         self.note(&role, text, true);
+    }
+
+    fn tend_cleaner(&mut self, now: Time) {
+        if let Err(error) = self.cleaner.tend(self.host.place().name(), now) {
+            self.note("", format!("cleaning up after the dead: {error}"), true);
+        }
     }
 
     /// Cleans up after the dead.

@@ -214,6 +214,7 @@ mod tests {
             speaks: true,
             died: Some(at(0)),
             healed: healed_ms.map(at),
+            spoke: healed_ms.map(at),
             alone: true,
             overtaken: false,
         };

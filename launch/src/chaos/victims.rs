@@ -180,6 +180,7 @@ impl Scene {
             speaks: victim.last_message.is_some_and(|last| now.since(last) < SPEAKS_WITHIN),
             died: (deed.kind == Kind::Kill).then_some(now),
             healed: None,
+            spoke: None,
             alone,
             overtaken: false,
             role,
@@ -195,10 +196,10 @@ impl Scene {
                     let stamp = Time::from_nanos(envelope.stamp_ns);
                     victim.last_message = victim.last_message.max(Some(stamp));
                     let newer = |wound: &&mut Wound| {
-                        wound.role == victim.role && wound.speaks && envelope.generation > wound.generation
+                        wound.role == victim.role && envelope.generation > wound.generation
                     };
                     for wound in self.wounds.iter_mut().filter(newer) {
-                        wound.healed.get_or_insert(stamp);
+                        wound.spoke.get_or_insert(stamp);
                     }
                 }
             }
@@ -213,7 +214,7 @@ impl Scene {
             if successor.is_some() || slot.is_none() {
                 wound.died.get_or_insert(now);
             }
-            if !wound.speaks && successor.is_some_and(|slot| slot.steps.load(Ordering::Relaxed) > 0) {
+            if successor.is_some_and(|slot| slot.steps.load(Ordering::Relaxed) > 0) {
                 wound.healed.get_or_insert(now);
             }
         }
@@ -264,7 +265,9 @@ impl Scene {
     pub(super) fn close_wounds(&mut self, now: Time) -> Vec<Verdict> {
         let settled = |wound: &Wound| {
             let judged = now.since(wound.at) > self.deadlines.told + SETTLED;
-            judged && wound.healed.is_some() || now.since(wound.at) > UNHEALED
+            // Who had something to say before may have none now: a door that was passed.
+            let spoke = wound.spoke.is_some() || !wound.speaks;
+            judged && wound.healed.is_some() && spoke || now.since(wound.at) > UNHEALED
         };
         let (closed, open) = std::mem::take(&mut self.wounds).into_iter().partition(settled);
         self.wounds = open;

@@ -33,8 +33,10 @@ pub(super) struct Wound {
     pub(super) speaks: bool,
     /// When it was dead: at once for a kill, later for one that hangs or leaves.
     pub(super) died: Option<Time>,
-    /// The successor's first message, or its first step where it speaks seldom.
+    /// When the successor was seen to take steps.
     pub(super) healed: Option<Time>,
+    /// The successor's first message.
+    pub(super) spoke: Option<Time>,
     /// Nobody else was down meanwhile, from whom it may have needed something to say anything.
     pub(super) alone: bool,
     /// A later wound has hit the successor before it spoke.
@@ -45,7 +47,7 @@ impl Wound {
     /// From death to the successor's first message.
     pub(super) fn heal(&self) -> Option<Duration> {
         let died = self.died?;
-        (!self.overtaken).then_some(self.healed?.since(died))
+        (!self.overtaken).then_some(self.spoke?.since(died))
     }
 }
 
@@ -82,7 +84,7 @@ impl Witness {
         self.told
             .iter()
             .filter(|told| told.turning && told.at > must_stand)
-            .find(|told| wound.healed.is_none_or(|healed| told.at < healed))
+            .find(|told| wound.spoke.is_none_or(|spoke| told.at < spoke))
             .map(|told| told.at.since(wound.at))
     }
 }
@@ -108,6 +110,7 @@ mod tests {
             speaks: true,
             died: Some(at(1000)),
             healed: healed_ms.map(at),
+            spoke: healed_ms.map(at),
             alone: true,
             overtaken: false,
         }

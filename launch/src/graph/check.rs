@@ -1,5 +1,6 @@
 //! Whether a graph can run: every binary's word against the graph's.
 
+use super::faults::Fault;
 use super::file::Overrides;
 use super::problem::{Problem, Problems};
 use super::schema::Schema;
@@ -54,8 +55,6 @@ pub(crate) struct Checked {
     pub(crate) folder: PathBuf,
     /// From which all randomness comes.
     pub(crate) seed: u64,
-    /// What the command line changed in the file.
-    pub(crate) overrides: Overrides,
     /// The topic whose `RunSummary` ends the run.
     pub(crate) finish: Option<String>,
     /// What the live view shows.
@@ -64,6 +63,14 @@ pub(crate) struct Checked {
     pub(crate) services: Vec<CheckedService>,
     /// The topics, in the order of their names.
     pub(crate) topics: Vec<CheckedTopic>,
+    /// What is done to services at logical moments.
+    pub(crate) faults: Vec<Fault>,
+    /// The graph as text, before the command line changed anything.
+    #[serde(skip)]
+    pub(crate) text: String,
+    /// What the command line changed.
+    #[serde(skip)]
+    pub(crate) overrides: Overrides,
 }
 
 /// A service that can run.
@@ -194,11 +201,13 @@ pub(crate) fn check(
         file: graph.file.clone(),
         folder: graph.folder.clone(),
         seed: graph.seed,
-        overrides: graph.overrides.clone(),
         finish: graph.finish.as_ref().map(|(topic, _)| topic.clone()),
         view: graph.view.clone(),
         services: services.collect(),
         topics,
+        faults: graph.faults.clone(),
+        text: graph.text.clone(),
+        overrides: Overrides::default(),
     })
 }
 

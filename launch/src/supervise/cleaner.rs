@@ -56,6 +56,11 @@ impl Cleaner {
         if broken_off { Err(io::Error::other("it took too long and was broken off")) } else { Ok(()) }
     }
 
+    /// Whether a helper is at work.
+    pub(crate) fn is_busy(&self) -> bool {
+        self.helper.is_some()
+    }
+
     /// Breaks off what is going on.
     pub(crate) fn stop(&mut self) {
         if let Some((mut helper, _)) = self.helper.take() {

@@ -74,6 +74,9 @@ impl Process {
         if as_shadow {
             command.arg("--shadow");
         }
+        if let Some(compute) = service.launch.compute {
+            command.args(["--compute-ns", &compute.as_nanos().to_string()]);
+        }
         for processor in &service.launch.cpu {
             command.args(["--cpu", &processor.to_string()]);
         }

@@ -148,7 +148,9 @@ fn pass(row: &mut [i16], [first, end]: [usize; 2], misses: &[i16; 2 * LANES], le
     while at < end {
         let count = (end - at).min(LANES);
         let block = row[at..].first_chunk_mut::<LANES>();
-        let (Some(block), Some(step)) = (block, misses[LANES - count..].first_chunk::<LANES>()) else { return };
+        let (Some(block), Some(step)) = (block, misses[LANES - count..].first_chunk::<LANES>()) else {
+            return;
+        };
         for (cell, step) in block.iter_mut().zip(step) {
             *cell = (*cell + step).max(least);
         }
