@@ -4,6 +4,7 @@ use crate::cli::NewArgs;
 use crate::graph::checkout;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 const FILES: [(&str, &str); 4] = [
     ("src/lib.rs", include_str!("../templates/service/lib.rs.txt")),
@@ -13,6 +14,8 @@ const FILES: [(&str, &str); 4] = [
 ];
 /// The workspace's own manifest: versions and profiles of a repository of its own are the same, so nothing is built twice.
 const WORKSPACE: &str = include_str!("../../Cargo.toml");
+/// The form of its sources.
+const STYLE: &str = include_str!("../../rustfmt.toml");
 /// What the new service depends on, beside the board and the messages.
 const DEPENDENCIES: [&str; 3] = ["schemars", "serde", "thiserror"];
 /// Longest name, so that `health/<name>` and the like stay short enough for the transport.
@@ -39,6 +42,7 @@ pub(crate) fn command(args: &NewArgs) -> Result<(), String> {
     files.extend(FILES.iter().map(|(path, text)| (PathBuf::from(path), filled(text, name))));
     if !inside {
         files.push((PathBuf::from(".gitignore"), "/target\n".to_owned()));
+        files.push((PathBuf::from("rustfmt.toml"), STYLE.to_owned()));
         // The versions that are known to work together; cargo strikes out what is not needed.
         if let Ok(lock) = std::fs::read_to_string(sources.join("Cargo.lock")) {
             files.push((PathBuf::from("Cargo.lock"), lock));
@@ -47,6 +51,8 @@ pub(crate) fn command(args: &NewArgs) -> Result<(), String> {
     for (path, text) in files {
         write(&folder.join(path), &text)?;
     }
+    // How lines break depends on the name's length. Without rustfmt they stay as they are.
+    let _ = Command::new("cargo").arg("fmt").current_dir(&folder).stderr(Stdio::null()).status();
     print!("{}", next_steps(name, &folder, inside));
     Ok(())
 }
