@@ -123,6 +123,7 @@ fn hurt(
     }
     report.took_s = clock::monotonic().seconds_since(began);
     report.contacts = scene.contacts();
+    report.contacts_at = scene.contacts_at();
     report.way_m = scene.way_m();
     report.deliveries = scene.deliveries();
     report.interrupted = signals.count() > 0;

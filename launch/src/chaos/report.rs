@@ -31,6 +31,7 @@ pub(super) struct Report {
     /// Who was given up by the launcher.
     pub(super) given_up: Option<String>,
     pub(super) contacts: Option<u64>,
+    pub(super) contacts_at: Vec<String>,
     pub(super) way_m: Option<f64>,
     pub(super) deliveries: Option<u64>,
     pub(super) left_behind: usize,
@@ -61,7 +62,7 @@ impl Report {
             Some(_) => self.healed += 1,
             None => self.unhealed.push(wound.role.clone()),
         }
-        if let Some(heal) = wound.heal().filter(|_| wound.speaks && !wound.in_start_up) {
+        if let Some(heal) = wound.heal().filter(|_| !wound.in_start_up) {
             let ms = heal.as_secs_f64() * 1e3;
             if wound.alone {
                 self.heals_ms.entry(wound.kind).or_default().push(ms);
@@ -108,9 +109,9 @@ impl Report {
         line("services that were hit", self.victims.join(", "));
         line("came back", format!("{} of {}", self.healed, self.deeds));
         for (kind, name) in [
-            (Kind::Kill, "death to first message, killed"),
-            (Kind::Hang, "death to first message, hanging"),
-            (Kind::Restart, "death to first message, restarted"),
+            (Kind::Kill, "death to first message*, killed"),
+            (Kind::Hang, "death to first message*, hanging"),
+            (Kind::Restart, "death to first message*, restarted"),
         ] {
             if let Some(heals) = self.heals_ms.get(&kind) {
                 let [median, most, max] = quantiles(heals);
@@ -131,6 +132,7 @@ impl Report {
         let slowest: Vec<String> =
             slowest.into_iter().take(4).map(|(role, ms)| format!("{role} {ms:.0} ms")).collect();
         line("slowest", slowest.join(", "));
+        line("", "* or to the third step of one that has nothing to say".to_owned());
         let late = self.too_late.len();
         line(
             "wheels stood in time",
@@ -143,6 +145,9 @@ impl Report {
         line("files left behind", self.left_behind.to_string());
         for wrong in self.too_late.iter().take(SHOWN) {
             let _ = writeln!(text, "wrong: {wrong}");
+        }
+        for contact in self.contacts_at.iter().take(SHOWN) {
+            let _ = writeln!(text, "wrong: {contact}");
         }
         for role in self.unhealed.iter().take(SHOWN) {
             let _ = writeln!(text, "wrong: `{role}` did not come back");
@@ -179,6 +184,7 @@ impl Report {
             "unhealed": self.unhealed,
             "given_up": self.given_up,
             "contacts": self.contacts,
+            "contacts_at": self.contacts_at,
             "way_m": self.way_m,
             "deliveries": self.deliveries,
             "left_behind": self.left_behind,
@@ -211,12 +217,12 @@ mod tests {
             at: at(0),
             generation: 1,
             in_chain: true,
-            speaks: true,
             died: Some(at(0)),
             healed: healed_ms.map(at),
             spoke: healed_ms.map(at),
             alone: true,
-            overtaken: false,
+            stepped: None,
+            overtaken: None,
         };
         Verdict { wound, too_late: too_late.map(Duration::from_millis) }
     }

@@ -7,7 +7,7 @@ use crate::supervise::{Phase, Supervisor};
 use board::JoinError;
 use board::tap::{Tap, TapPublisher, TapReader};
 use geometry::World;
-use messages::{AppliedWheels, Message as _, MissionStatus, Order, Time, View, WorldTruth};
+use messages::{AppliedWheels, Message as _, MissionStatus, Order, Time, TrueBody, View, WorldTruth};
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 use rustix::process::{Pid, Signal, kill_process};
@@ -16,8 +16,6 @@ use std::time::Duration;
 
 const WHEELS: &str = "wheels/applied";
 const ORDERS: &str = "mission/orders";
-/// Who said something within this time before it was hit speaks often.
-const SPEAKS_WITHIN: Duration = Duration::from_millis(300);
 /// A successor that has not spoken by then does not count as healed.
 const UNHEALED: Duration = Duration::from_secs(10);
 /// Messages may still be on their way when a deadline is over.
@@ -36,7 +34,6 @@ struct Victim {
     role: String,
     in_chain: bool,
     topics: Vec<TapReader>,
-    last_message: Option<Time>,
 }
 
 /// The robot under test.
@@ -56,6 +53,8 @@ pub(super) struct Scene {
     way_m: f64,
     world: Option<WorldTruth>,
     first_contacts: Option<u64>,
+    /// Where the robot was when it touched something.
+    contacts_at: Vec<String>,
     tap: Tap,
 }
 
@@ -93,7 +92,6 @@ impl Scene {
                 role: service.role.clone(),
                 in_chain: in_chain(&service.role),
                 topics: topics.map_err(|error| error.to_string())?,
-                last_message: None,
             });
         }
         if victims.is_empty() {
@@ -124,6 +122,7 @@ impl Scene {
             way_m: 0.0,
             world: None,
             first_contacts: None,
+            contacts_at: Vec::new(),
             tap,
         })
     }
@@ -167,7 +166,9 @@ impl Scene {
         }
         let mut alone = true;
         for open in self.wounds.iter_mut().filter(|wound| wound.healed.is_none()) {
-            open.overtaken |= open.role == role;
+            if open.role == role {
+                open.overtaken.get_or_insert(now);
+            }
             open.alone &= open.role == role;
             alone &= open.role == role;
         }
@@ -177,12 +178,12 @@ impl Scene {
             at: now,
             generation,
             in_chain: victim.in_chain,
-            speaks: victim.last_message.is_some_and(|last| now.since(last) < SPEAKS_WITHIN),
             died: (deed.kind == Kind::Kill).then_some(now),
             healed: None,
             spoke: None,
             alone,
-            overtaken: false,
+            stepped: None,
+            overtaken: None,
             role,
         });
         true
@@ -194,7 +195,6 @@ impl Scene {
             for reader in &mut victim.topics {
                 while let Some((envelope, _)) = reader.next() {
                     let stamp = Time::from_nanos(envelope.stamp_ns);
-                    victim.last_message = victim.last_message.max(Some(stamp));
                     let newer = |wound: &&mut Wound| {
                         wound.role == victim.role && envelope.generation > wound.generation
                     };
@@ -214,8 +214,12 @@ impl Scene {
             if successor.is_some() || slot.is_none() {
                 wound.died.get_or_insert(now);
             }
-            if successor.is_some_and(|slot| slot.steps.load(Ordering::Relaxed) > 0) {
+            let steps = successor.map_or(0, |slot| slot.steps.load(Ordering::Relaxed));
+            if steps > 0 {
                 wound.healed.get_or_insert(now);
+            }
+            if steps >= 3 {
+                wound.stepped.get_or_insert(now);
             }
         }
         while let Some((envelope, bytes)) = self.wheels.as_mut().and_then(TapReader::next) {
@@ -227,6 +231,9 @@ impl Scene {
         while let Some((_, bytes)) = self.truth.as_mut().and_then(TapReader::next) {
             if let Ok(view) = View::<WorldTruth>::parse(bytes) {
                 self.first_contacts.get_or_insert(view.message.contacts);
+                if self.world.is_some_and(|last| last.contacts < view.message.contacts) {
+                    self.contacts_at.push(contact(view.message, view.elements, &self.wounds, now));
+                }
                 let step_m = self
                     .world
                     .map_or(0.0, |last| (view.message.x_m - last.x_m).hypot(view.message.y_m - last.y_m));
@@ -265,9 +272,7 @@ impl Scene {
     pub(super) fn close_wounds(&mut self, now: Time) -> Vec<Verdict> {
         let settled = |wound: &Wound| {
             let judged = now.since(wound.at) > self.deadlines.told + SETTLED;
-            // Who had something to say before may have none now: a door that was passed.
-            let spoke = wound.spoke.is_some() || !wound.speaks;
-            judged && wound.healed.is_some() && spoke || now.since(wound.at) > UNHEALED
+            judged && wound.healed.is_some() || now.since(wound.at) > UNHEALED
         };
         let (closed, open) = std::mem::take(&mut self.wounds).into_iter().partition(settled);
         self.wounds = open;
@@ -291,6 +296,11 @@ impl Scene {
         Some(self.world?.contacts.saturating_sub(self.first_contacts?))
     }
 
+    /// Where, and how.
+    pub(super) fn contacts_at(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.contacts_at)
+    }
+
     /// How far the robot went.
     pub(super) fn way_m(&self) -> Option<f64> {
         self.world.map(|_| self.way_m)
@@ -300,6 +310,31 @@ impl Scene {
     pub(super) fn deliveries(&self) -> Option<u64> {
         self.status.map(|status| status.delivered)
     }
+}
+
+/// A contact in words: where the robot was, how fast, what was nearest, and who was down lately.
+fn contact(truth: &WorldTruth, bodies: &[TrueBody], wounds: &[Wound], now: Time) -> String {
+    let distance_m = |body: &TrueBody| (body.x_m - truth.x_m).hypot(body.y_m - truth.y_m);
+    let here = bodies.iter().filter(|body| body.floor == truth.floor);
+    let nearest = here.min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
+    let nearest = nearest.map_or("nothing".to_owned(), |body| {
+        let kind = body.kind.get().map_or("body".to_owned(), |kind| format!("{kind:?}"));
+        format!("{kind} at {:.2} m ({:.2}, {:.2})", distance_m(body), body.x_m, body.y_m)
+    });
+    let down: Vec<String> = wounds
+        .iter()
+        .map(|wound| format!("{} {:.0} ms before", wound.role, now.seconds_since(wound.at) * 1e3))
+        .collect();
+    format!(
+        "contact at ({:.2}, {:.2}), heading {:.2}, wheels {:.2} and {:.2} m/s, world time {:.2} s; nearest: {nearest}; hit: {}",
+        truth.x_m,
+        truth.y_m,
+        truth.heading_rad,
+        truth.left_mps,
+        truth.right_mps,
+        truth.world_time_s,
+        down.join(", ")
+    )
 }
 
 /// From the parameters of the base driver, or what is usual.

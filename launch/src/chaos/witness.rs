@@ -29,25 +29,29 @@ pub(super) struct Wound {
     pub(super) generation: u32,
     /// Its death stops the wheels.
     pub(super) in_chain: bool,
-    /// It said something often enough that its successor's first message tells when it is back.
-    pub(super) speaks: bool,
     /// When it was dead: at once for a kill, later for one that hangs or leaves.
     pub(super) died: Option<Time>,
     /// When the successor was seen to take steps.
     pub(super) healed: Option<Time>,
     /// The successor's first message.
     pub(super) spoke: Option<Time>,
+    /// When it had taken three steps: who has said nothing by then has nothing to say at present.
+    pub(super) stepped: Option<Time>,
     /// Nobody else was down meanwhile, from whom it may have needed something to say anything.
     pub(super) alone: bool,
-    /// A later wound has hit the successor before it spoke.
-    pub(super) overtaken: bool,
+    /// When a later deed hit the same role before this wound was healed.
+    pub(super) overtaken: Option<Time>,
 }
 
 impl Wound {
-    /// From death to the successor's first message.
+    /// From death to the successor's first message, or to its third step where it has nothing to say.
     pub(super) fn heal(&self) -> Option<Duration> {
         let died = self.died?;
-        (!self.overtaken).then_some(self.spoke?.since(died))
+        let back = match (self.spoke, self.stepped) {
+            (Some(spoke), Some(stepped)) => spoke.min(stepped),
+            (spoke, stepped) => spoke.or(stepped)?,
+        };
+        self.overtaken.is_none().then_some(back.since(died))
     }
 }
 
@@ -84,6 +88,8 @@ impl Witness {
         self.told
             .iter()
             .filter(|told| told.turning && told.at > must_stand)
+            // From then on the later deed is judged.
+            .filter(|told| wound.overtaken.is_none_or(|overtaken| told.at < overtaken))
             .find(|told| wound.spoke.is_none_or(|spoke| told.at < spoke))
             .map(|told| told.at.since(wound.at))
     }
@@ -107,12 +113,12 @@ mod tests {
             at: at(1000),
             generation: 1,
             in_chain: true,
-            speaks: true,
             died: Some(at(1000)),
             healed: healed_ms.map(at),
             spoke: healed_ms.map(at),
             alone: true,
-            overtaken: false,
+            stepped: None,
+            overtaken: None,
         }
     }
 
@@ -142,7 +148,9 @@ mod tests {
     fn a_successor_that_was_hit_itself_says_nothing_about_healing() {
         let mut wound = wound(Some(1050));
         assert_eq!(wound.heal(), Some(Duration::from_millis(50)));
-        wound.overtaken = true;
+        wound.stepped = Some(at(1030));
+        assert_eq!(wound.heal(), Some(Duration::from_millis(30)));
+        wound.overtaken = Some(at(1040));
         assert_eq!(wound.heal(), None);
     }
 }

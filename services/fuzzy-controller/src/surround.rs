@@ -48,6 +48,8 @@ const TRIED_S: f64 = 0.9;
 const TRIES: u32 = 6;
 /// What is too near already may come nearer by this, for noise.
 const NOISE_M: f64 = 0.001;
+/// The robot does not move so far between two looks.
+const JUMP_M: f64 = 0.5;
 /// Slow enough for the narrowest places.
 const SLOW_MPS: f64 = 0.10;
 
@@ -63,6 +65,8 @@ struct Point {
 pub(crate) struct Surround {
     points: Vec<Point>,
     here: Option<Pose2>,
+    /// The last place that was known.
+    last_here: Option<Pose2>,
     frame: Option<Time>,
     /// The known walls nearby, as points too.
     walls: Vec<Point2<f64>>,
@@ -113,11 +117,12 @@ impl Surround {
         params: &Params,
     ) {
         self.here = here;
-        let Some(here) = here else {
+        let Some(here) = here else { return };
+        // In another frame, or after an unseen journey, the places mean nothing.
+        if self.last_here.replace(here).is_some_and(|last| last.distance_m(here) > JUMP_M) {
             self.points.clear();
             self.assumed.clear();
-            return;
-        };
+        }
         let is_kept = |point: &Point| {
             let near = (point.place - here.position()).norm() <= KEPT_WITHIN_M;
             let below = distance_m(here, point.place, params) <= 0.0;
@@ -223,7 +228,11 @@ impl Surround {
     /// The motion nearest to the wanted one that keeps away from everything seen; standing when there is none.
     /// `may_advance` lets a turn on the spot that cannot be turned here be put off: the robot then drives on straight.
     pub(crate) fn allowed(&self, wanted: Wheels, may_advance: bool, params: &Params) -> Wheels {
-        let (Some(here), true) = (self.here, params.keep_away_m > 0.0) else { return wanted };
+        if params.keep_away_m <= 0.0 {
+            return wanted;
+        }
+        // Without odometry nobody knows what is beside the robot.
+        let Some(here) = self.here else { return [0.0; 2] };
         let forward_mps = 0.5 * (wanted[0] + wanted[1]);
         let fastest_mps = wanted[0].abs().max(wanted[1].abs());
         if fastest_mps <= 0.0 || self.is_clear(here, wanted, 2.0 * params.keep_away_m, params) {
