@@ -48,7 +48,11 @@ impl Map {
             hit: thousandths(log_odds(params.hit_probability)),
             clamp,
             misses,
-            limits: Limits { range_max_m: params.range_max_m, beam_width_max_rad: params.beam_width_max_rad },
+            limits: Limits {
+                range_max_m: params.range_max_m,
+                clear_max_m: params.clear_max_m,
+                beam_width_max_rad: params.beam_width_max_rad,
+            },
             sectors: Sectors::default(),
             spans: Spans::default(),
             ended: Vec::new(),
@@ -148,7 +152,9 @@ fn pass(row: &mut [i16], [first, end]: [usize; 2], misses: &[i16; 2 * LANES], le
     while at < end {
         let count = (end - at).min(LANES);
         let block = row[at..].first_chunk_mut::<LANES>();
-        let (Some(block), Some(step)) = (block, misses[LANES - count..].first_chunk::<LANES>()) else { return };
+        let (Some(block), Some(step)) = (block, misses[LANES - count..].first_chunk::<LANES>()) else {
+            return;
+        };
         for (cell, step) in block.iter_mut().zip(step) {
             *cell = (*cell + step).max(least);
         }
