@@ -46,11 +46,8 @@ impl OccupancyMap {
 
     /// The map as a grid; `None` when its header makes none, or does not fit its elements.
     pub fn grid(&self, elements: &[u8]) -> Option<OccupancyGrid> {
-        let origin = Pose2 {
-            x_m: self.origin_x_m,
-            y_m: self.origin_y_m,
-            heading_rad: self.origin_heading_rad,
-        };
+        let origin =
+            Pose2 { x_m: self.origin_x_m, y_m: self.origin_y_m, heading_rad: self.origin_heading_rad };
         let frame = GridFrame::new(self.columns, self.rows, self.resolution_m, origin).ok()?;
         let cell = |&percent: &u8| Occupancy::from_percent(percent).unwrap_or_default();
         OccupancyGrid::new(frame, elements.iter().map(cell).collect()).ok()
