@@ -48,7 +48,11 @@ impl Map {
             hit: thousandths(log_odds(params.hit_probability)),
             clamp,
             misses,
-            limits: Limits { range_max_m: params.range_max_m, beam_width_max_rad: params.beam_width_max_rad },
+            limits: Limits {
+                range_max_m: params.range_max_m,
+                clear_max_m: params.clear_max_m,
+                beam_width_max_rad: params.beam_width_max_rad,
+            },
             sectors: Sectors::default(),
             spans: Spans::default(),
             ended: Vec::new(),

@@ -42,9 +42,13 @@ pub struct Params {
     /// The log-odds of a cell stay within this, so that what has changed is learnt again (X-4B).
     #[schemars(range(min = 0.5, max = 10.0))]
     pub clamp_log_odds: f64,
-    /// Readings are used up to here; one that sees nothing, or something farther away, only clears as far.
+    /// Readings are used up to here; one that sees something farther away only clears as far.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub range_max_m: f64,
+    /// A beam that sees nothing within its sensor's range clears as far, at most up to `range_max_m`; 0 when it may have been swallowed by
+    /// glass or black paint, and tells nothing.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub clear_max_m: f64,
     /// A beam speaks for what lies within its width, and no farther than halfway to the next beam.
     #[schemars(range(min = 0.0001, max = 0.6))]
     pub beam_width_max_rad: f64,
@@ -75,6 +79,7 @@ impl Default for Params {
             miss_probability: 0.40,
             clamp_log_odds: 3.5,
             range_max_m: 10.0,
+            clear_max_m: 6.0,
             beam_width_max_rad: 0.035,
             pose_max_age_ms: 200,
             publish_period_ms: 1000,
@@ -132,6 +137,7 @@ impl messages::Parameters for Params {
             ("miss_probability", self.miss_probability, 0.01, 0.49),
             ("clamp_log_odds", self.clamp_log_odds, 0.5, 10.0),
             ("range_max_m", self.range_max_m, 0.1, 100.0),
+            ("clear_max_m", self.clear_max_m, 0.0, 100.0),
             ("beam_width_max_rad", self.beam_width_max_rad, 0.0001, 0.6),
             ("pose_max_age_ms", self.pose_max_age_ms as f64, 10.0, 10_000.0),
             ("publish_period_ms", self.publish_period_ms as f64, 50.0, 60_000.0),

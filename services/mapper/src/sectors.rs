@@ -19,6 +19,8 @@ pub(crate) type Point = [f64; 2];
 pub(crate) struct Limits {
     /// Readings are used up to here.
     pub(crate) range_max_m: f64,
+    /// A beam that sees nothing clears up to here.
+    pub(crate) clear_max_m: f64,
     /// Beams are no wider.
     pub(crate) beam_width_max_rad: f64,
 }
@@ -36,8 +38,8 @@ impl Sectors {
     /// Reads a scan taken at a pose of the robot; `None` when it cannot be used.
     ///
     /// The inverse model of Thrun et al. 2005, table 9.2: a cell belongs to the beam nearest in direction; up to the reading it is free,
-    /// around the reading, as thick as a cell, it is occupied. Readings of zero, below, or NaN are none. Those at the sensor's or our
-    /// limit, or beyond, saw nothing, and clear as far as the limit.
+    /// around the reading, as thick as a cell, it is occupied. Readings of zero, below, or NaN are none. Those beyond our limit clear up
+    /// to it; those at the sensor's limit or beyond saw nothing.
     pub(crate) fn read(
         &mut self,
         frame: &GridFrame,
@@ -65,7 +67,7 @@ impl Sectors {
         // Beams beyond one turn would speak for the same directions again.
         let most = (TAU / step_rad + 1e-6).min(BEAMS_MAX as f64) as usize;
         let ranges = &ranges[..ranges.len().min(most.max(1))];
-        let width_rad = if ranges.len() > 1 { step_rad } else { TAU }.min(limits.beam_width_max_rad);
+        let width_rad = if step_rad > 0.0 { step_rad } else { TAU }.min(limits.beam_width_max_rad);
         // Counter-clockwise, whichever way the sensor turns.
         let backwards = scan.angle_step_rad < 0.0;
         let first = if backwards { (ranges.len() - 1) as f64 * scan.angle_step_rad } else { 0.0 };
@@ -74,7 +76,9 @@ impl Sectors {
         let fan = Fan {
             centre: [centre.x, centre.y],
             per_m: 1.0 / frame.resolution_m(),
+            sensor_m: scan.range_max_m,
             limit_m,
+            clear_m: limit_m.min(limits.clear_max_m),
             edge: unit(angle_rad),
             across: unit(width_rad),
             // To the next beam, where that is not the edge of this one.
@@ -98,9 +102,12 @@ impl Sectors {
             let range_m = f64::from(range_m);
             if range_m > 0.0 {
                 let is_hit = range_m < fan.limit_m;
-                // The obstacle is as thick as a cell, half of it before the reading.
-                let free =
-                    if is_hit { (range_m * fan.per_m - 0.5).max(0.0) } else { fan.limit_m * fan.per_m };
+                let free = if is_hit {
+                    // The obstacle is as thick as a cell, half of it before the reading.
+                    (range_m * fan.per_m - 0.5).max(0.0)
+                } else {
+                    fan.per_m * if range_m < fan.sensor_m { fan.limit_m } else { fan.clear_m }
+                };
                 self.free.push(fan.at(edge, free));
                 self.free.push(fan.at(next, free));
                 if is_hit {
@@ -140,7 +147,10 @@ struct Fan {
     centre: Point,
     /// Cells to the metre.
     per_m: f64,
+    /// As far as the sensor sees, as far as its readings are used, and as far as it clears when it sees nothing.
+    sensor_m: f64,
     limit_m: f64,
+    clear_m: f64,
     /// The right edge of the first beam.
     edge: Point,
     /// From a beam's right edge to its left one, to the next beam's right one, and to its middle.

@@ -117,6 +117,20 @@ fn what_a_beam_says() {
 }
 
 #[test]
+fn a_beam_that_sees_nothing_clears_as_far_as_it_is_trusted() {
+    let free_at = |params: Params, range_m: f32, x_m: f64| {
+        let mut map = empty(&params);
+        let scan = RangeScan { angle_min_rad: -0.1, range_max_m: 4.0, ..narrow() };
+        map.add(Pose2::default(), &scan, &[range_m; 21]);
+        map.log_odds_at(Point2::new(x_m, 0.02)).unwrap() < 0.0
+    };
+    let wary = Params { clear_max_m: 2.0, range_max_m: 3.0, ..params() };
+    assert!(free_at(wary.clone(), 4.0, 1.9) && !free_at(wary.clone(), 4.0, 2.1));
+    assert!(free_at(wary.clone(), 3.9, 2.9) && !free_at(wary.clone(), 3.9, 3.1));
+    assert!(!free_at(Params { clear_max_m: 0.0, ..wary }, 4.0, 0.5));
+}
+
+#[test]
 fn a_bad_beam_takes_nothing_from_its_neighbours() {
     let (robot, scan) = (Pose2::new(0.0, 0.0, 0.0), turning());
     let good = look(&room(2.0), robot, &scan, 360);
