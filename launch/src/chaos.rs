@@ -8,6 +8,7 @@ mod witness;
 
 use crate::cli::ChaosArgs;
 use crate::graph::{self, Checked};
+use crate::record::Recording;
 use crate::summary;
 use crate::supervise::Supervisor;
 use crate::up::Signals;
@@ -59,6 +60,8 @@ fn run(graph: &Checked, args: &ChaosArgs) -> Result<Report, Box<dyn Error>> {
     let board = args.board.as_deref().unwrap_or(&graph.name);
     let mut supervisor = Supervisor::new(graph, board, args.log_dir.as_deref(), false)?;
     let place = supervisor.host.place().clone();
+    let recording = args.record.as_deref();
+    let recording = recording.map(|file| Recording::begin(&place, graph, file)).transpose()?;
     supervisor.start_all();
     while !supervisor.all_ready() {
         pause(&mut supervisor, LOOK);
@@ -75,7 +78,9 @@ fn run(graph: &Checked, args: &ChaosArgs) -> Result<Report, Box<dyn Error>> {
     let mut scene = Scene::new(graph, &args.spare, tap, graph.seed)?;
     let mut report = hurt(&mut supervisor, &mut scene, args, graph.seed, &signals);
     drop(scene);
+    let recorded = recording.map_or(Ok(()), Recording::end);
     supervisor.stop(&|| signals.count() > 1)?;
+    recorded?;
     report.left_behind = place.shared_memory().len() + usize::from(place.exists());
     Ok(report)
 }

@@ -258,8 +258,8 @@ pub(crate) struct UpArgs {
     /// In lockstep: the processor for the whole graph
     #[arg(long, value_name = "N", requires = "lockstep")]
     pub(crate) cpu: Option<usize>,
-    /// In lockstep: record every message into this file (MCAP)
-    #[arg(long, value_name = "FILE.mcap", requires = "lockstep", value_hint = clap::ValueHint::FilePath)]
+    /// Record every message into this file (MCAP)
+    #[arg(long, value_name = "FILE.mcap", value_hint = clap::ValueHint::FilePath)]
     pub(crate) record: Option<PathBuf>,
     /// In lockstep: go on only when told to, by lines on the standard input (`advance SECONDS`, `look`, `kill ROLE`, `end`); for tests
     #[arg(long, requires = "lockstep", hide = true)]
@@ -430,6 +430,9 @@ pub(crate) struct ChaosArgs {
     /// Name the board otherwise than the graph does
     #[arg(long, value_name = "NAME")]
     pub(crate) board: Option<String>,
+    /// Record every message into this file (MCAP)
+    #[arg(long, value_name = "FILE.mcap", value_hint = clap::ValueHint::FilePath)]
+    pub(crate) record: Option<PathBuf>,
     /// Print what happens, a line an event
     #[arg(long)]
     pub(crate) events: bool,

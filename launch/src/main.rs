@@ -18,6 +18,7 @@ mod observer;
 mod plain;
 mod play;
 mod prompter;
+mod record;
 mod rerun;
 mod shadow;
 mod steering;
@@ -72,7 +73,12 @@ fn up_command(args: &UpArgs) -> ExitCode {
     if args.detach {
         return commands::finish(detach::detach(args.board.as_deref().unwrap_or(&graph.name)));
     }
-    let options = up::Options { board: args.board.clone(), logs: args.log_dir.clone(), json: args.json };
+    let options = up::Options {
+        board: args.board.clone(),
+        logs: args.log_dir.clone(),
+        record: args.record.clone(),
+        json: args.json,
+    };
     let mut lines = plain::Lines::new(args.no_view);
     if args.lockstep {
         let pace = lockstep::Pace {

@@ -9,6 +9,7 @@ use board::tap::{OUTSIDE_ROUND, Tap, TapReader};
 use messages::{RunState, RunSummary, Time, View};
 use recording::{Digest, Digester, Envelope, Recorder};
 use std::collections::BTreeMap;
+use std::time::Duration;
 
 /// Reads every topic after every round.
 pub(crate) struct Observer {
@@ -20,7 +21,7 @@ pub(crate) struct Observer {
     outside: Vec<bool>,
     summary: Option<RunSummary>,
     /// Kept until the end: dropping it gives the place on the board back.
-    _tap: Tap,
+    tap: Tap,
 }
 
 struct Watched {
@@ -54,7 +55,7 @@ impl Observer {
         let digester = Digester::new(contents.topics.iter().map(|topic| topic.name.as_str()));
         let recorder = pace.record.as_deref().map(|file| Recorder::new(file, &contents)).transpose()?;
         let (outside, finish) = (vec![false; readers.len()], graph.finish.clone());
-        Ok(Self { readers, digester, recorder, finish, outside, summary: None, _tap: tap })
+        Ok(Self { readers, digester, recorder, finish, outside, summary: None, tap })
     }
 
     /// Takes in what this round has brought.
@@ -82,6 +83,17 @@ impl Observer {
                 }
             }
         }
+        Ok(())
+    }
+
+    /// In host time: takes in what has come, and sleeps until more comes, at most for `rest`.
+    ///
+    /// # Errors
+    /// When the recording cannot be written.
+    pub(crate) fn look_and_rest(&mut self, rest: Duration) -> Result<(), recording::RecordingError> {
+        let heard = self.tap.bell();
+        self.look()?;
+        self.tap.wait(heard, rest);
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 use crate::control::{self, Answer, Request};
 use crate::graph::Checked;
 use crate::monitor::Monitor;
+use crate::record::Recording;
 use crate::summary;
 use crate::supervise::Supervisor;
 use board::clock;
@@ -34,6 +35,8 @@ pub(crate) struct Options {
     pub(crate) board: Option<String>,
     /// Keep logs here instead of on the board.
     pub(crate) logs: Option<PathBuf>,
+    /// Record every message here; in logical time the pace says so.
+    pub(crate) record: Option<PathBuf>,
     /// Print the end as JSON.
     pub(crate) json: bool,
 }
@@ -75,6 +78,9 @@ fn run(
     let signals = Signals::catch()?;
     let mut supervisor = Supervisor::new(graph, board, options.logs.as_deref(), false)?;
     let listener = control::listen(supervisor.host.place())?;
+    let recording = options.record.as_deref();
+    let recording =
+        recording.map(|file| Recording::begin(supervisor.host.place(), graph, file)).transpose()?;
     supervisor.start_all();
     let mut monitor = Monitor::new(&supervisor, graph.finish.as_deref())?;
     let end = watch(graph, &mut supervisor, &mut monitor, &listener, &signals, display);
@@ -88,11 +94,13 @@ fn run(
     let restarts = supervisor.services.iter().map(|service| service.restarts).sum();
     drop(monitor);
     drop(listener);
+    let recorded = recording.map_or(Ok(()), Recording::end);
     supervisor.stop(&|| signals.count() > 1)?;
     if let End::Broken(role) = &end {
         eprintln!("error: `{role}` cannot go on; the last lines of its log:");
         logs.iter().for_each(|line| eprintln!("  {line}"));
     }
+    recorded?;
     if let Some(word) = &final_word {
         print!(
             "{}",

@@ -6,7 +6,7 @@
 
 use crate::controllers::Wheels;
 use crate::params::Params;
-use geometry::{Point2, Pose2, Segment, Vector2};
+use geometry::{Point2, Pose2, Segment, Vector2, angle};
 use messages::{Reading, TOF_COUNT, Time, TofRanges};
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +48,8 @@ const TRIED_S: f64 = 0.9;
 const TRIES: u32 = 6;
 /// What is too near already may come nearer by this, for noise.
 const NOISE_M: f64 = 0.001;
+/// A robot that moves less than this between two looks, in metres and radians, stands.
+const STILL: f64 = 5e-4;
 /// The robot does not move so far between two looks.
 const JUMP_M: f64 = 0.5;
 /// Slow enough for the narrowest places.
@@ -74,6 +76,8 @@ pub(crate) struct Surround {
     axis: Option<Vector2<f64>>,
     /// How far what was seen may reach beyond its seen end.
     assumed: Vec<Point>,
+    /// When this was last judged, and where the robot was.
+    judged: Option<(Time, Option<Pose2>)>,
     stuck_since: Option<Time>,
     doubted_since: Option<Time>,
 }
@@ -188,7 +192,27 @@ impl Surround {
     }
 
     /// Notices that the robot wants to move and may not, and doubts the assumptions then.
+    ///
+    /// What was seen grows old only while the robot moves, or while it is kept from moving by what was seen: a robot that is held by something else (a guard,
+    /// a silent sensor) finds everything where it was.
     pub(crate) fn judge(&mut self, now: Time, wanted: Wheels, allowed: Wheels) {
+        let last = self.judged.replace((now, self.here));
+        let still = |(_, there): (Time, Option<Pose2>)| match (there, self.here) {
+            (Some(there), Some(here)) => {
+                there.distance_m(here) < STILL
+                    && angle::difference(there.heading_rad, here.heading_rad).abs() < STILL
+            }
+            _ => true,
+        };
+        let is_kept_away = wanted != [0.0; 2] && allowed == [0.0; 2] && self.here.is_some();
+        if let Some(last) = last.filter(|last| still(*last))
+            && !is_kept_away
+        {
+            let held = now.since(last.0);
+            for point in self.points.iter_mut().chain(&mut self.assumed) {
+                point.seen = point.seen.after(held);
+            }
+        }
         if wanted == [0.0; 2] || allowed != [0.0; 2] {
             self.stuck_since = None;
             return;
@@ -373,6 +397,25 @@ mod tests {
         check(&[], &[(3, 0.1), (4, 0.1)], DRIVE, |[left, right]| 0.5 * (left + right) < 0.11);
         // The end of a mail cart on the right: the rest of it is there although it is not seen.
         check(&[1.0, -0.7], &[(1, 0.12)], [0.2, 0.02], |[left, right]| left - right < 0.1);
+    }
+
+    #[test]
+    fn a_robot_that_is_held_forgets_nothing() {
+        let held_for = |seconds: u32, wanted: Wheels, allowed: Wheels| {
+            let mut surround = Surround::default();
+            let mut ranges = TofRanges { range_m: [2.0; TOF_COUNT], ..TofRanges::default() };
+            ranges.range_m[3] = 0.4;
+            for tick in 0..=seconds * 20 {
+                let now = Time::from_secs_f64(0.05 * f64::from(tick));
+                let look = (tick < 3).then_some((now, &ranges));
+                surround.observe(now, Some(Pose2::IDENTITY), look, &coffee());
+                surround.judge(now, wanted, allowed);
+            }
+            surround.points.len()
+        };
+        assert!(held_for(60, [0.0; 2], [0.0; 2]) > 0, "nobody wants to drive");
+        assert!(held_for(60, DRIVE, DRIVE) > 0, "something else holds the robot");
+        assert_eq!(held_for(60, DRIVE, [0.0; 2]), 0, "what holds it has left long ago");
     }
 
     #[test]
