@@ -156,6 +156,7 @@ impl<'a> Stage<'a> {
             instant = self.conductor.next_instant(host);
             instant = [instant, self.prompter.next()].into_iter().flatten().min();
         }
+        let instant = instant.or_else(|| self.conductor.instant_of_the_woken());
         Ok(match (instant, fault) {
             // A fault strikes before the instant at its moment.
             (Some(instant), Some(fault)) if fault <= instant => Next::Fault(fault),
