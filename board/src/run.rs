@@ -5,7 +5,7 @@ use crate::example;
 use crate::health::StepTimes;
 use crate::host;
 use crate::interface::{About, Interface};
-use crate::node::{Joined, Node};
+use crate::node::{JoinError, Joined, Node};
 use crate::place::Place;
 use crate::port::{PublisherLink, bytes_of, release_held};
 use crate::shared::Shared;
@@ -24,6 +24,8 @@ type Step = Box<dyn FnMut(Time)>;
 
 /// A service ends with this code when its set-up is wrong: starting it again would not help.
 pub const EXIT_SETUP: u8 = 2;
+/// A service ends with this code when the board had no room for it: another time it may have.
+const EXIT_FAILED: u8 = 1;
 /// Longest sleep: how often a waiting process shows that it lives.
 const HEARTBEAT: Duration = Duration::from_millis(100);
 const HEALTH_PERIOD: Duration = Duration::from_secs(1);
@@ -68,9 +70,14 @@ fn run_with(
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::from(EXIT_SETUP)
+            ExitCode::from(if passes_by(&*error) { EXIT_FAILED } else { EXIT_SETUP })
         }
     }
+}
+
+/// Whether an error is the board's and not the set-up's, so that another start may help.
+fn passes_by(error: &(dyn Error + Send + Sync + 'static)) -> bool {
+    matches!(error.downcast_ref(), Some(JoinError::Transport(_) | JoinError::Full { .. }))
 }
 
 fn command(about: About) -> Command {
@@ -85,6 +92,13 @@ fn command(about: About) -> Command {
         .arg(text("role", "ROLE", "The service's name in the graph [default: the binary's name]"))
         .arg(text("params", "JSON", "Parameters, as a JSON object; see --example").default_value("{}"))
         .arg(text("slot", "N", "The place that the launcher has prepared").value_parser(value_parser!(u32)).hide(true))
+        .arg(
+            Arg::new("shadow")
+                .long("shadow")
+                .action(ArgAction::SetTrue)
+                .hide(true)
+                .help("Publish beside the topics of the role, to be compared"),
+        )
         .arg(text("compute-ns", "N", "In lockstep: how long a step takes").value_parser(value_parser!(u64)).hide(true))
         .arg(text("cpu", "N", "Run on this processor only").value_parser(value_parser!(usize)).action(ArgAction::Append))
         .arg(text("fifo", "PRIORITY", "Real-time priority, 1 to 99").value_parser(value_parser!(i32).range(1..=99)))
@@ -150,10 +164,12 @@ fn serve(
     apply_scheduling(arguments)?;
     let shared = Rc::clone(&joined.shared);
     catch_signals(&shared)?;
-    let mut node = Node::joined(&role, joined);
+    let is_shadow = arguments.get_flag("shadow");
+    let mut node = Node::joined(&role, joined, is_shadow);
     let step = make(&mut node, parameters(arguments)?)?;
     let Some(mut joined) = node.joined.take() else { return Ok(()) };
-    let health = open_health(&mut joined, &role)?;
+    let name = if is_shadow { host::shadow_role(&role) } else { role };
+    let health = open_health(&mut joined, &name)?;
     let mut service = Service {
         shared: Rc::clone(&shared),
         wakes: node.wakes.iter().map(|&topic| (topic, 0)).collect(),

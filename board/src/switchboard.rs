@@ -106,6 +106,10 @@ pub struct Slot {
     pub step_since_ns: AtomicU64,
     /// Steps taken.
     pub steps: AtomicU64,
+    /// Messages that it has published while nobody was to hear it: a newcomer's, before it takes over.
+    pub muted: AtomicU64,
+    /// 1 when it may take over the topics of its role, each with its next message: the last step of a swap.
+    pub may_take_over: AtomicU32,
     /// When its next timer is due; `u64::MAX` without one.
     pub next_due_ns: AtomicU64,
     role: [AtomicU8; ROLE_BYTES],
@@ -356,9 +360,10 @@ impl Slot {
     /// Prepares the slot for a new process.
     pub fn reset(&self, pid: u32) {
         self.pid.store(pid, Ordering::Relaxed);
-        for counter in [&self.heartbeat_ns, &self.step_since_ns, &self.steps] {
+        for counter in [&self.heartbeat_ns, &self.step_since_ns, &self.steps, &self.muted] {
             counter.store(0, Ordering::Relaxed);
         }
+        self.may_take_over.store(0, Ordering::Relaxed);
         self.next_due_ns.store(u64::MAX, Ordering::Relaxed);
         self.sleeps.store(0, Ordering::Relaxed);
         self.served.store(0, Ordering::Relaxed);

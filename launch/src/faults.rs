@@ -84,7 +84,7 @@ impl Faults {
         let Some(service) = supervisor.services.iter().find(|service| service.service.role == role) else {
             return Ok(());
         };
-        let (launch, lives) = (service.service.launch.clone(), service.slot.is_some());
+        let (launch, lives) = (service.service.launch.clone(), service.slot().is_some());
         match deed {
             // It is dead already.
             Deed::Kill { .. } | Deed::Stop { .. } if !lives => {}
@@ -122,7 +122,7 @@ impl Faults {
                 let deaths = self.lives.get(&role).map_or(0, |&(_, deaths)| deaths);
                 self.lives.insert(role.clone(), (at, deaths));
                 let service = supervisor.services.iter().find(|service| service.service.role == role);
-                if let Some(slot) = service.and_then(|service| service.slot) {
+                if let Some(slot) = service.and_then(|service| service.slot()) {
                     conductor.admit(&role, slot, launch.compute.unwrap_or_default());
                 }
                 supervisor.note(&role, format!("back at {at_s:.3} s"), false);

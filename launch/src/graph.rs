@@ -19,8 +19,9 @@ mod text;
 mod topics;
 mod tree;
 
-pub(crate) use check::{Checked, CheckedService, Publisher};
+pub(crate) use check::{Checked, CheckedService, CheckedTopic, Publisher};
 pub(crate) use faults::{Fault, FaultKind};
-pub(crate) use file::Overrides;
+pub(crate) use file::{Overrides, shown};
+pub(crate) use find::checkout;
 pub(crate) use report::{Request, check_command, graph_command, prepare, prepare_recorded};
 pub(crate) use settings::{Priority, ViewSettings};

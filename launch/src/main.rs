@@ -1,5 +1,6 @@
 //! The launcher: checks, starts, watches, swaps and stops the services of a robot.
 
+mod chaos;
 mod cli;
 mod commands;
 mod compare;
@@ -11,15 +12,18 @@ mod faults;
 mod graph;
 mod lockstep;
 mod monitor;
+mod new;
 mod notes;
 mod observer;
 mod plain;
 mod play;
 mod prompter;
 mod rerun;
+mod shadow;
 mod steering;
 mod summary;
 mod supervise;
+mod swap;
 mod up;
 mod view;
 
@@ -36,7 +40,10 @@ fn main() -> ExitCode {
         Command::Top(args) => commands::finish(commands::top(&args)),
         Command::Logs(args) => commands::finish(commands::logs(&args)),
         Command::Restart(args) => commands::finish(commands::restart(&args)),
+        Command::Swap(args) => commands::finish(swap::command(&args)),
         Command::Stop(args) => commands::finish(commands::stop(&args)),
+        Command::Chaos(args) => chaos::command(&args),
+        Command::New(args) => commands::finish(new::command(&args)),
         Command::Experiment(args) => experiment::command(&args),
         Command::Graph(args) => graph::graph_command(&args.which.request(None), args.dot),
         Command::Order(args) => commands::finish(commands::order(&args)),

@@ -67,7 +67,7 @@ impl<'a> Stage<'a> {
     ) -> Result<Self, Failure> {
         let players = supervisor.services.iter().filter_map(|service| {
             let compute = service.service.launch.compute.unwrap_or_default();
-            Some((service.service.role.clone(), service.slot?, compute))
+            Some((service.service.role.clone(), service.slot()?, compute))
         });
         let mut conductor = Conductor::new(&supervisor.host, players);
         conductor.begin_at(pace.begin);
@@ -177,7 +177,7 @@ impl<'a> Stage<'a> {
         let services = &self.supervisor.services;
         let mut lives = |role: &str| {
             let service = services.iter().find(|service| service.service.role == role);
-            service.and_then(|service| service.pid).is_some_and(board::switchboard::process_lives)
+            service.and_then(|service| service.pid()).is_some_and(board::switchboard::process_lives)
         };
         let host = &self.supervisor.host;
         let played = self.conductor.play_instant(host, at, &mut self.prompter, &mut look, &mut lives);

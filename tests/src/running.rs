@@ -290,6 +290,20 @@ impl Running {
         self.launcher.borrow().id()
     }
 
+    /// Lets another service play a role while the graph runs, as `launch swap` does, and returns what it says.
+    pub fn swap(&self, role: &str, binary: &str) -> Value {
+        self.try_swap(role, binary).unwrap_or_else(|| panic!("no swap of `{role}`:\n{}", self.output()))
+    }
+
+    /// As `swap`, for a graph that may end at any time.
+    pub fn try_swap(&self, role: &str, binary: &str) -> Option<Value> {
+        let output = Command::new(launcher())
+            .args(["swap", &format!("{role}={binary}"), "--json", "--no-build", "--board", self.board()])
+            .output()
+            .unwrap_or_else(|error| panic!("the launcher does not start: {error}"));
+        serde_json::from_slice(&output.stdout).ok()
+    }
+
     /// Kills a service (signal 9) and returns the moment. In logical time its successor takes its first step 0.1 s later.
     pub fn kill(&self, role: &str) -> Time {
         if self.steering.is_some() {

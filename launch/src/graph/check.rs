@@ -10,7 +10,7 @@ use super::topics::{Member, connect};
 use super::tree::{Content, Entry, Node};
 use board::{Direction, Interface};
 use messages::Description;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
@@ -74,7 +74,7 @@ pub(crate) struct Checked {
 }
 
 /// A service that can run.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct CheckedService {
     /// Its name in this graph.
     pub(crate) role: String,
@@ -91,7 +91,7 @@ pub(crate) struct CheckedService {
 }
 
 /// A topic of the graph.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct CheckedTopic {
     /// Its name.
     pub(crate) name: String,
@@ -108,7 +108,7 @@ pub(crate) struct CheckedTopic {
 }
 
 /// Who publishes a topic.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Publisher {
     /// This role.
@@ -119,8 +119,18 @@ pub(crate) enum Publisher {
     Nobody,
 }
 
+impl Publisher {
+    /// The service that publishes it, if one does.
+    pub(crate) fn role(&self) -> Option<&str> {
+        match self {
+            Self::Service(role) => Some(role),
+            Self::External | Self::Nobody => None,
+        }
+    }
+}
+
 /// A reader of a topic.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Reader {
     /// The role that reads.
     pub(crate) role: String,

@@ -6,7 +6,7 @@ use super::problem::{Problem, Problems};
 use super::source::{Place, Source};
 use super::suggest::hint;
 use super::tree::{Content, Entry, Node, Table};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -63,7 +63,7 @@ pub(crate) struct ServiceTable {
 }
 
 /// What the launcher, not the service, reads: `[role.launch]`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LaunchSettings {
     /// When a dead service is started again; `None` for never.
     pub(crate) restart: Option<Restart>,
@@ -82,7 +82,7 @@ pub(crate) struct LaunchSettings {
 }
 
 /// When a dead service is started again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Restart {
     /// Wait before the first restart.
     pub(crate) backoff_min: Duration,
@@ -104,7 +104,7 @@ impl Restart {
 }
 
 /// How the operating system ranks a process.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Priority {
     /// As any other.

@@ -20,6 +20,7 @@ pub fn catalogue() -> Vec<Description> {
         Health,
         Metric,
         MissionStatus,
+        OccupancyMap,
         Odometry,
         Order,
         Particle,
