@@ -158,7 +158,7 @@ impl Conductor {
         }
     }
 
-    /// When the next instant is, as far as the services know: `None` when no timer is left and nobody was woken.
+    /// When the next instant is, as far as the services' timers know.
     pub(crate) fn next_instant(&mut self, host: &Host) -> Option<Time> {
         self.note_woken(host);
         if !self.begun {
@@ -175,12 +175,16 @@ impl Conductor {
             due_ns.max(player.hangs_until_ns)
         };
         match self.players.iter().map(due).min().unwrap_or(u64::MAX) {
-            u64::MAX if self.players.iter().any(|player| player.is_woken) => {
-                Some(Time::from_nanos(now_ns + 1))
-            }
             u64::MAX => None,
             due_ns => Some(Time::from_nanos(due_ns.max(now_ns))),
         }
+    }
+
+    /// The next instant of services without timers that were woken from outside: at once.
+    pub(crate) fn instant_of_the_woken(&self) -> Option<Time> {
+        let now_ns = self.now.as_nanos();
+        let waits = |player: &Player| player.is_woken && player.hangs_until_ns <= now_ns;
+        self.players.iter().any(waits).then(|| Time::from_nanos(now_ns + 1))
     }
 
     /// Plays the instant at this moment. `after_round` sees the board when a round has ended; `lives` says whether a service's process lives;

@@ -28,13 +28,15 @@ enum Deed {
 pub(crate) struct Faults {
     /// In the order of time; of the same moment in the order of the graph file.
     planned: Vec<(Time, String, Deed)>,
+    /// Those that no graph has planned, but a test has ordered.
+    pub(crate) ordered: Vec<Fault>,
     /// When a service came back last, and its deaths in a row.
     lives: HashMap<String, (Time, u32)>,
 }
 
 impl Faults {
     /// Those of a graph.
-    pub(crate) fn new(faults: &[Fault]) -> Self {
+    pub(crate) fn new<'a>(faults: impl IntoIterator<Item = &'a Fault>) -> Self {
         let mut new = Self::default();
         for fault in faults {
             let deed = match fault.kind {
@@ -51,9 +53,11 @@ impl Faults {
         self.planned.first().map(|(at, ..)| *at)
     }
 
-    /// Kills a service before the next instant.
+    /// Kills a service at this moment, before the next instant.
     pub(crate) fn kill_now(&mut self, now: Time, role: &str) {
         self.plan(now, role, Deed::Kill { down: DOWN });
+        let kind = FaultKind::Kill { down: None };
+        self.ordered.push(Fault { at: now.since(Time::ZERO), role: role.to_owned(), kind });
     }
 
     fn plan(&mut self, at: Time, role: &str, deed: Deed) {

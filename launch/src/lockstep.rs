@@ -1,6 +1,6 @@
 //! `launch up --lockstep`: the same processes in logical time.
 
-use crate::graph::Checked;
+use crate::graph::{Checked, Fault};
 use crate::observer::Observer;
 use crate::play::Stage;
 use crate::prompter::{Part, Prompter};
@@ -27,6 +27,10 @@ pub(crate) struct Pace {
     pub(crate) begin: Time,
     /// End after the instant at this moment, or the first one after it, whatever the referee says.
     pub(crate) until: Option<Time>,
+    /// Play no instant after this moment.
+    pub(crate) last: Option<Time>,
+    /// Faults beside those of the graph.
+    pub(crate) faults: Vec<Fault>,
     /// The processor for the whole graph.
     pub(crate) cpu: Option<usize>,
     /// Record every message here.
@@ -61,6 +65,8 @@ pub(crate) struct Outcome {
     pub(crate) wall_s: f64,
     pub(crate) turns: u64,
     pub(crate) restarts: u32,
+    /// Faults that were ordered while it ran.
+    pub(crate) ordered: Vec<Fault>,
     pub(crate) interrupted: bool,
 }
 
@@ -114,7 +120,7 @@ pub(crate) fn run(
             supervisor.last_log_lines(&role, 12).iter().for_each(|line| eprintln!("  {line}"));
         }
     }
-    let recorded = observer.finish(outcome.as_ref().ok().map(|outcome| outcome.end));
+    let recorded = observer.finish(outcome.as_ref().ok());
     drop(observer);
     supervisor.stop(&|| signals.count() > 1)?;
     recorded?;

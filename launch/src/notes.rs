@@ -1,6 +1,7 @@
 //! What a recording says of its run, so that the run can be made again.
 
-use crate::graph::{Checked, Overrides};
+use crate::graph::{Checked, Fault, Overrides};
+use crate::lockstep::Outcome;
 use messages::Time;
 use recording::{Manifest, Recorder};
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,8 @@ struct Binary {
 const ORIGINS: &str = "run";
 /// The note with the last instant, in nanoseconds.
 const END: &str = "end_ns";
+/// The note with the faults that a test has ordered, as a JSON array.
+const ORDERED: &str = "ordered_faults";
 /// The note with the topics on which something came from outside, as a JSON array.
 const OUTSIDE: &str = "outside";
 /// The note with the roles that ran alone on recorded inputs, as a JSON array.
@@ -46,9 +49,14 @@ pub(crate) fn of_graph(graph: &Checked) -> BTreeMap<String, String> {
 }
 
 /// The notes that are known at the end only.
-pub(crate) fn at_end<'a>(recorder: &mut Recorder, end: Option<Time>, outside: impl Iterator<Item = &'a str>) {
-    if let Some(end) = end {
-        recorder.note(END, &end.as_nanos().to_string());
+pub(crate) fn at_end<'a>(
+    recorder: &mut Recorder,
+    outcome: Option<&Outcome>,
+    outside: impl Iterator<Item = &'a str>,
+) {
+    if let Some(outcome) = outcome {
+        recorder.note(END, &outcome.end.as_nanos().to_string());
+        recorder.note(ORDERED, &serde_json::json!(outcome.ordered).to_string());
     }
     recorder.note(OUTSIDE, &serde_json::json!(outside.collect::<Vec<_>>()).to_string());
 }
@@ -61,6 +69,11 @@ pub(crate) fn origins(manifest: &Manifest) -> Option<Origins> {
 /// The last instant; `None` when the run did not end in order.
 pub(crate) fn end(manifest: &Manifest) -> Option<Time> {
     manifest.notes.get(END)?.parse().ok().map(Time::from_nanos)
+}
+
+/// Faults that a test ordered while it ran.
+pub(crate) fn ordered(manifest: &Manifest) -> Vec<Fault> {
+    manifest.notes.get(ORDERED).and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
 }
 
 /// Topics on which something came from outside; all of them when that is not known.

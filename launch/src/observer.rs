@@ -1,7 +1,7 @@
 //! Every message of a run in logical time, seen once: for the digest, the recording, and the referee's word.
 
 use crate::graph::Checked;
-use crate::lockstep::Pace;
+use crate::lockstep::{Outcome, Pace};
 use crate::notes;
 use board::JoinError;
 use board::manifest::Manifest;
@@ -113,14 +113,14 @@ impl Observer {
         self.recorder.as_mut().map_or(Ok(()), Recorder::flush)
     }
 
-    /// Ends the recording; `end` is the run's last instant if it ended in order.
+    /// Ends the recording; there is an outcome if the run ended in order.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub(crate) fn finish(&mut self, end: Option<Time>) -> Result<(), recording::RecordingError> {
+    pub(crate) fn finish(&mut self, outcome: Option<&Outcome>) -> Result<(), recording::RecordingError> {
         let Some(mut recorder) = self.recorder.take() else { return Ok(()) };
         let topics = self.readers.iter().zip(&self.outside).filter(|(_, outside)| **outside);
-        notes::at_end(&mut recorder, end, topics.map(|(watched, _)| watched.topic.as_str()));
+        notes::at_end(&mut recorder, outcome, topics.map(|(watched, _)| watched.topic.as_str()));
         recorder.finish().map(|_| ())
     }
 

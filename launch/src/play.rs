@@ -79,7 +79,7 @@ impl<'a> Stage<'a> {
             prompter,
             monitor,
             conductor,
-            faults: Faults::new(&graph.faults),
+            faults: Faults::new(graph.faults.iter().chain(&pace.faults)),
             steering: pace.steered.then(Steering::new),
             began,
             next_glance: began.after(GLANCE),
@@ -108,6 +108,9 @@ impl<'a> Stage<'a> {
                 }
             }
             let next = self.next()?;
+            if pace.last.is_some_and(|last| next.at() > last) {
+                break;
+            }
             if let Some(steering) = &self.steering
                 && next.at() > steering.target()
             {
@@ -134,7 +137,9 @@ impl<'a> Stage<'a> {
             }
         }
         // What came from outside after the last instant belongs to the run.
-        self.prompter.say_between(self.conductor.now().after(Duration::from_nanos(1)))?;
+        let end = pace.last.unwrap_or(self.conductor.now()).max(self.conductor.now());
+        self.conductor.rest_at(&self.supervisor.host, end);
+        self.prompter.say_between(end.after(Duration::from_nanos(1)))?;
         self.observer.look()?;
         if let Some(steering) = &mut self.steering {
             steering.say_end();
@@ -151,6 +156,7 @@ impl<'a> Stage<'a> {
             instant = self.conductor.next_instant(host);
             instant = [instant, self.prompter.next()].into_iter().flatten().min();
         }
+        let instant = instant.or_else(|| self.conductor.instant_of_the_woken());
         Ok(match (instant, fault) {
             // A fault strikes before the instant at its moment.
             (Some(instant), Some(fault)) if fault <= instant => Next::Fault(fault),
@@ -220,7 +226,7 @@ impl<'a> Stage<'a> {
                 if !self.supervisor.services.iter().any(|service| service.service.role == role) {
                     return Err(format!("there is no service `{role}`").into());
                 }
-                self.faults.kill_now(now, &role);
+                self.faults.kill_now(steering.target(), &role);
             }
             Order::End => return Ok(false),
         }
@@ -250,6 +256,7 @@ impl<'a> Stage<'a> {
             end: self.conductor.now(),
             wall_s: clock::monotonic().seconds_since(self.began),
             turns: self.conductor.turns,
+            ordered: self.faults.ordered.clone(),
             restarts: self.supervisor.services.iter().map(|service| service.restarts).sum(),
             interrupted,
         }

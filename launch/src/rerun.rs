@@ -112,7 +112,9 @@ fn rerun(args: &RerunArgs) -> Result<Report, Failure> {
         Some(end) => end,
         None => last_stamp(&recording)?,
     };
-    let mut pace = Pace { until: Some(until), ..Pace::default() };
+    let mut pace = Pace { until: Some(until), last: Some(until), ..Pace::default() };
+    pace.faults = notes::ordered(manifest);
+    pace.faults.retain(|fault| roles.contains(&fault.role));
     let graph = if driven.is_empty() {
         let topics = notes::outside(manifest);
         if !topics.is_empty() {

@@ -71,8 +71,11 @@ impl Steering {
             match Order::parse(line.trim()) {
                 Ok(order) => {
                     self.owes_answer = true;
-                    if let Order::Advance(duration) = order {
-                        self.target = now.after(duration);
+                    match order {
+                        Order::Advance(duration) => self.target = now.after(duration),
+                        // After the instant at this moment, if there was one: a rerun must find the same place.
+                        Order::Kill(_) => self.target = now.after(Duration::from_nanos(1)),
+                        Order::Look | Order::End => {}
                     }
                     return order;
                 }

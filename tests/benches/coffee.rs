@@ -7,6 +7,7 @@ use std::time::Duration;
 use tests::{Graph, launcher};
 
 const STARTS: usize = 10;
+const PAIRS: usize = 9;
 const IDLE: Duration = Duration::from_secs(10);
 
 fn main() {
@@ -27,6 +28,34 @@ fn main() {
         "a delivery in logical time: {logical_s:.1} s in {wall_s:.2} s, {:.0} x real time, {:.1} us a turn",
         logical_s / wall_s,
         wall_s / number(&run["turns"]) * 1e6
+    );
+    recording();
+}
+
+/// What it costs to record: runs with and without, in turns, by the clock.
+fn recording() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("run.mcap");
+    let (mut plain_s, mut recorded_s) = (Vec::new(), Vec::new());
+    let (mut bytes, mut logical_s) = (0, f64::NAN);
+    for _ in 0..PAIRS {
+        plain_s.push(number(&Graph::load("coffee").run_in_lockstep()["wall_s"]));
+        let _ = std::fs::remove_file(&file);
+        let graph = Graph::load("coffee").with(&["--record", &file.display().to_string()]);
+        let run = graph.run_in_lockstep();
+        recorded_s.push(number(&run["wall_s"]));
+        bytes = std::fs::metadata(&file).map_or(0, |found| found.len());
+        logical_s = number(&run["logical_s"]);
+    }
+    let least = |times: &[f64]| times.iter().copied().fold(f64::INFINITY, f64::min);
+    let mut ratios: Vec<f64> =
+        recorded_s.iter().zip(&plain_s).map(|(recorded, plain)| recorded / plain).collect();
+    ratios.sort_by(f64::total_cmp);
+    println!(
+        "recording: {:.3} times the duration without ({PAIRS} pairs, median; {:.3} of the shortest), {:.0} MB an hour",
+        ratios[PAIRS / 2],
+        least(&recorded_s) / least(&plain_s),
+        bytes as f64 / logical_s * 3600.0 / 1e6
     );
 }
 

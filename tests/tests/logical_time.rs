@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
 
 use serde_json::{Value, json};
+use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 use tests::{Graph, Running, launcher};
@@ -215,11 +216,41 @@ fn orders_from_outside_come_out_the_same_in_a_rerun() {
         board::clock::sleep(Duration::from_millis(100));
     }
     assert_eq!(orders, 2, "nobody could order");
-    let rerun =
-        Command::new(launcher()).arg("rerun").arg(&file).args(["--no-build", "--json"]).output().unwrap();
+    let report = check_rerun(&file, &[]);
+    assert_eq!(report["digests"]["rerun"]["topics"]["mission/orders"][0], 2, "{report:#}");
+}
+
+#[track_caller]
+fn check_rerun(file: &Path, arguments: &[&str]) -> Value {
+    let rerun = Command::new(launcher())
+        .arg("rerun")
+        .arg(file)
+        .args(["--no-build", "--json"])
+        .args(arguments)
+        .output()
+        .unwrap();
     let report: Value = serde_json::from_slice(&rerun.stdout).unwrap_or_default();
     assert_eq!(report["same"], true, "{report:#}\n{}", String::from_utf8_lossy(&rerun.stderr));
-    assert_eq!(report["digests"]["rerun"]["topics"]["mission/orders"][0], 2, "{report:#}");
+    report
+}
+
+#[test]
+fn a_run_with_faults_and_slow_computers_comes_out_the_same_in_a_rerun() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("faulty.mcap");
+    let faults = json!([
+        {"at_s": 10.0, "kill": "planner", "down_s": 0.5},
+        {"at_s": 12.0, "stop": "controller", "for_s": 0.3},
+        {"at_s": 14.0, "stop": "localiser"},
+    ]);
+    let graph =
+        with_faults(faults).set("controller.launch.compute_ms", 7).set("planner.launch.compute_ms", 60);
+    let _ = graph.with(&["--until", "20", "--record", file.to_str().unwrap()]).run_in_lockstep();
+    let report = check_rerun(&file, &[]);
+    assert!(report["digests"]["rerun"]["messages"].as_u64().unwrap() > 5000);
+    for role in ["planner", "controller", "localiser", "navigator"] {
+        check_rerun(&file, &["--only", role]);
+    }
 }
 
 /// One test as the machine sees it: everything that was published.
@@ -253,7 +284,11 @@ fn a_failed_test_says_what_happened_and_keeps_the_recording() {
         let graph = Graph::load("coffee").lockstep(7).start();
         *board_of_it.lock().unwrap() = graph.board().to_owned();
         *place_of_it.lock().unwrap() = Some(graph.place().clone());
-        graph.advance(Duration::from_secs(1));
+        graph.advance(Duration::from_millis(700));
+        graph.publish("mission/orders", json!({"room": "205"}));
+        graph.kill("controller");
+        graph.publish("mission/orders", json!({"room": "206"}));
+        graph.advance(Duration::from_millis(1234));
         panic!("on purpose");
     });
     assert!(failing.unwrap().join().is_err());
@@ -262,5 +297,8 @@ fn a_failed_test_says_what_happened_and_keeps_the_recording() {
     let kept = tests::failed_graphs().join(format!("{name}-{}.mcap", board.lock().unwrap()));
     let digest = Command::new(launcher()).arg("digest").arg(&kept).output().unwrap();
     assert!(digest.status.success(), "{}", String::from_utf8_lossy(&digest.stderr));
+    // What the test did to the graph is on record too.
+    check_rerun(&kept, &[]);
+    check_rerun(&kept, &["--only", "controller"]);
     std::fs::remove_file(kept).unwrap();
 }

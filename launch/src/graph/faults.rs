@@ -4,11 +4,11 @@ use super::problem::{Problem, Problems};
 use super::settings::{refuse_key, take};
 use super::suggest::hint;
 use super::tree::{Content, Entry, Node, Table};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// A service is killed or stopped at a logical moment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Fault {
     /// When, in logical time.
     pub(crate) at: Duration,
@@ -19,7 +19,7 @@ pub(crate) struct Fault {
 }
 
 /// What is done to a service.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum FaultKind {
     /// It is killed; its successor takes its first step so much later, if it is restarted at all.
