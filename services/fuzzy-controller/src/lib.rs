@@ -209,7 +209,7 @@ impl FuzzyController {
         // Only on a path, and not when it leads back.
         let may_advance = wanted.distance_m.is_finite() && wanted.error_rad.abs() < FRAC_PI_2;
         let allowed = self.surround.allowed(slow_enough, may_advance, &self.params);
-        self.surround.judge(now, slow_enough, allowed);
+        self.surround.judge(now, slow_enough, allowed, wanted.behaviour == Behaviour::BadInput);
         let change_mps =
             if wanted.at_once { f64::INFINITY } else { self.params.acceleration_mps2 * elapsed_s };
         self.wheels = eased(self.wheels, allowed, change_mps);

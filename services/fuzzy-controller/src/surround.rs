@@ -193,9 +193,9 @@ impl Surround {
 
     /// Notices that the robot wants to move and may not, and doubts the assumptions then.
     ///
-    /// What was seen grows old only while the robot moves, or while it is kept from moving by what was seen: a robot that is held by something else (a guard,
-    /// a silent sensor) finds everything where it was.
-    pub(crate) fn judge(&mut self, now: Time, wanted: Wheels, allowed: Wheels) {
+    /// What was seen does not grow old while the robot stands although it may drive (a guard holds it), or because it is `blind`, without inputs: it
+    /// finds everything where it was.
+    pub(crate) fn judge(&mut self, now: Time, wanted: Wheels, allowed: Wheels, blind: bool) {
         let last = self.judged.replace((now, self.here));
         let still = |(_, there): (Time, Option<Pose2>)| match (there, self.here) {
             (Some(there), Some(here)) => {
@@ -204,10 +204,8 @@ impl Surround {
             }
             _ => true,
         };
-        let is_kept_away = wanted != [0.0; 2] && allowed == [0.0; 2] && self.here.is_some();
-        if let Some(last) = last.filter(|last| still(*last))
-            && !is_kept_away
-        {
+        let is_held = blind || self.here.is_none() || allowed != [0.0; 2];
+        if let Some(last) = last.filter(|last| still(*last) && is_held) {
             let held = now.since(last.0);
             for point in self.points.iter_mut().chain(&mut self.assumed) {
                 point.seen = point.seen.after(held);
@@ -401,7 +399,7 @@ mod tests {
 
     #[test]
     fn a_robot_that_is_held_forgets_nothing() {
-        let held_for = |seconds: u32, wanted: Wheels, allowed: Wheels| {
+        let held_for = |seconds: u32, wanted: Wheels, allowed: Wheels, blind: bool| {
             let mut surround = Surround::default();
             let mut ranges = TofRanges { range_m: [2.0; TOF_COUNT], ..TofRanges::default() };
             ranges.range_m[3] = 0.4;
@@ -409,13 +407,14 @@ mod tests {
                 let now = Time::from_secs_f64(0.05 * f64::from(tick));
                 let look = (tick < 3).then_some((now, &ranges));
                 surround.observe(now, Some(Pose2::IDENTITY), look, &coffee());
-                surround.judge(now, wanted, allowed);
+                surround.judge(now, wanted, allowed, blind);
             }
             surround.points.len()
         };
-        assert!(held_for(60, [0.0; 2], [0.0; 2]) > 0, "nobody wants to drive");
-        assert!(held_for(60, DRIVE, DRIVE) > 0, "something else holds the robot");
-        assert_eq!(held_for(60, DRIVE, [0.0; 2]), 0, "what holds it has left long ago");
+        assert!(held_for(60, [0.0; 2], [0.0; 2], true) > 0, "it sees nothing");
+        assert!(held_for(60, DRIVE, DRIVE, false) > 0, "something else holds the robot");
+        assert_eq!(held_for(60, DRIVE, [0.0; 2], false), 0, "what holds it has left long ago");
+        assert_eq!(held_for(60, [0.0; 2], [0.0; 2], false), 0, "it waits");
     }
 
     #[test]
