@@ -177,6 +177,7 @@ fn serve(
         step,
         publishers: joined.publishers.clone(),
         topology: 0,
+        awaited: Vec::new(),
         times: StepTimes::default(),
         steps: 0,
         late_steps: 0,
@@ -190,6 +191,8 @@ fn serve(
     }
     // Those who publish what we read serve us the last message.
     shared.switchboard.announce_reader();
+    let joined_at = shared.switchboard.header().topology.load(Ordering::Acquire);
+    service.awaited = node.wakes.iter().map(|&topic| (topic, joined_at)).collect();
     if shared.lockstep {
         service.run_lockstep()
     } else {
@@ -229,6 +232,8 @@ struct Service {
     step: Step,
     publishers: Vec<PublisherLink>,
     topology: u32,
+    /// Topics that wake the service and whose publishers may not have served it the last message yet, with the topology at its coming.
+    awaited: Vec<(u32, u32)>,
     times: StepTimes,
     steps: u64,
     late_steps: u64,
@@ -355,7 +360,23 @@ impl Service {
             woken |= count != *seen;
             *seen = count;
         }
+        if !self.awaited.is_empty() {
+            woken |= self.look_for_last_messages();
+        }
         woken
+    }
+
+    /// A message from before our time counts when its publisher has served us, which may be later than our first step.
+    fn look_for_last_messages(&mut self) -> bool {
+        let board = &self.shared.switchboard;
+        let waiting = self.awaited.len();
+        self.awaited.retain(|&(topic, joined_at)| {
+            let publisher = board.topic(topic).map(|entry| entry.publisher.load(Ordering::Acquire));
+            let slot = publisher.and_then(|publisher| board.slot(publisher));
+            // The topology counts round after a while.
+            slot.is_some_and(|slot| (slot.served.load(Ordering::Acquire).wrapping_sub(joined_at) as i32) < 0)
+        });
+        self.awaited.len() < waiting
     }
 
     fn serve_new_readers(&mut self) {
@@ -367,6 +388,10 @@ impl Service {
             }
             if let Some(slot) = self.shared.own_slot() {
                 slot.served.store(topology, Ordering::Release);
+            }
+            // Whoever came after our last message would sleep on it until the next one.
+            if !self.shared.lockstep {
+                self.publishers.iter().for_each(|link| self.shared.switchboard.ring_readers(link.topic));
             }
         }
     }
