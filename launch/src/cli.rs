@@ -39,7 +39,7 @@ pub(crate) enum Command {
     Up(UpArgs),
     /// List the services of a running graph
     Ps(StatusArgs),
-    /// Watch a running graph: rates, step times, restarts, and the map
+    /// Watch a running graph: rates, step times, restarts, and what happens
     Top(StatusArgs),
     /// Show what services said
     Logs(LogsArgs),
