@@ -78,3 +78,56 @@ pub fn close(board: &Switchboard) {
 fn change(gate: &AtomicU32, from: u32, to: u32) -> bool {
     gate.compare_exchange(from, to, Ordering::AcqRel, Ordering::Acquire).is_ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicU64;
+
+    fn switchboard() -> Switchboard {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let name = format!("gate-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let file = std::env::temp_dir().join(name);
+        let board = Switchboard::create(&file).expect("a page");
+        std::fs::remove_file(file).expect("the page's file");
+        board
+    }
+
+    #[test]
+    fn nobody_acts_while_an_instant_is_played() {
+        let board = switchboard();
+        let (instant, acted) = (AtomicU64::new(0), AtomicU32::new(0));
+        std::thread::scope(|scope| {
+            for _ in 0..2 {
+                scope.spawn(|| {
+                    for _ in 0..20 {
+                        let seen = between_instants(&board, || instant.load(Ordering::Acquire));
+                        // Odd while one is played.
+                        assert_eq!(seen % 2, 0);
+                        acted.fetch_add(1, Ordering::AcqRel);
+                    }
+                });
+            }
+            while acted.load(Ordering::Acquire) < 40 {
+                instant.fetch_add(1, Ordering::AcqRel);
+                std::hint::spin_loop();
+                instant.fetch_add(1, Ordering::AcqRel);
+                let_in(&board);
+            }
+        });
+    }
+
+    #[test]
+    fn a_gate_that_is_open_stays_open_and_the_dead_hold_up_nobody() {
+        let board = switchboard();
+        open(&board);
+        assert_eq!(between_instants(&board, || 1) + between_instants(&board, || 2), 3);
+        close(&board);
+        // Somebody wished, or entered, and died.
+        for word in [WISHED, USED] {
+            board.header().gate.store(word, Ordering::Release);
+            let_in(&board);
+            assert_eq!(board.header().gate.load(Ordering::Acquire), CLOSED);
+        }
+    }
+}

@@ -276,6 +276,11 @@ fn errors_name_the_file_and_the_cause() {
 
 /// Two runs of two topics, of which the second is changed.
 fn changed(change: impl FnOnce(&mut Vec<Plain>)) -> Option<Difference> {
+    changed_runs(change).0
+}
+
+/// The same with the tallies of the topic `tagranges/0`.
+fn changed_runs(change: impl FnOnce(&mut Vec<Plain>)) -> (Option<Difference>, TopicComparison) {
     let manifest = manifest(vec![messages::TagRanges::description(), messages::Path::description()]);
     let mut messages: Vec<Plain> = Vec::new();
     for index in 0..20_u64 {
@@ -294,7 +299,65 @@ fn changed(change: impl FnOnce(&mut Vec<Plain>)) -> Option<Difference> {
     let b = recorded(second.path(), &manifest, &messages, 9);
     let difference = first_difference(&a, &b).unwrap();
     assert_eq!(difference.is_none(), a.digest().unwrap() == b.digest().unwrap());
-    difference
+    let mut topics = compare_topics(&a, &b, &["tagranges/0".to_owned()]).unwrap();
+    (difference, topics.remove(0))
+}
+
+/// Same, changed, missing, added, the moment of the first difference, and the first field.
+#[track_caller]
+fn check_tally(
+    change: impl FnOnce(&mut Vec<Plain>),
+    counts: [u64; 4],
+    first_ns: Option<u64>,
+    field: Option<(&str, u64)>,
+) {
+    let tally = changed_runs(change).1;
+    assert_eq!([tally.same, tally.changed, tally.missing, tally.added], counts, "{tally:#?}");
+    assert_eq!(tally.recorded, tally.same + tally.changed + tally.missing);
+    assert_eq!(tally.rerun, tally.same + tally.changed + tally.added);
+    assert_eq!(tally.first.as_ref().map(|first| first.stamp_ns), first_ns, "{tally:#?}");
+    let found = tally.fields.first().map(|field| (field.field.as_str(), field.messages));
+    assert_eq!(found, field, "{tally:#?}");
+}
+
+#[test]
+fn runs_are_tallied_topic_by_topic() {
+    let set_x = |messages: &mut Vec<Plain>, index: usize, x_m: f64| {
+        let fields = messages::TagRanges::description().fields;
+        let offset = fields.iter().find(|field| field.name == "x_m").unwrap().offset;
+        messages[index].2[offset..offset + 8].copy_from_slice(&x_m.to_le_bytes());
+    };
+    check_tally(|_| {}, [20, 0, 0, 0], None, None);
+    // Another topic is another matter.
+    check_tally(|messages| messages[21].2[40 + 16 + 8] ^= 1, [20, 0, 0, 0], None, None);
+    check_tally(|messages| messages[8].1.origin_ns += 1, [19, 1, 0, 0], Some(4_000), None);
+    // A message that is left out shifts the sequence of the others, which are the same all the same.
+    let left_out = |messages: &mut Vec<Plain>| {
+        messages.remove(8);
+        messages.iter_mut().skip(8).for_each(|(_, envelope, _)| envelope.sequence -= 1);
+    };
+    check_tally(left_out, [19, 0, 1, 0], Some(4_000), None);
+    check_tally(|messages| messages[8].1.stamp_ns += 1, [19, 0, 1, 1], Some(4_000), None);
+    check_tally(|messages| messages.truncate(30), [15, 0, 5, 0], Some(15_000), None);
+    check_tally(|messages| messages[8].1.round = 7, [19, 0, 1, 1], Some(4_000), None);
+    let (mut one, mut other) = (Vec::new(), Vec::new());
+    let moved = |by_m: f64, kept: &mut Vec<Plain>| {
+        let _ = changed_runs(|messages| {
+            set_x(messages, 8, 1.0 + by_m);
+            set_x(messages, 12, 2.0 + 2.0 * by_m);
+            kept.clone_from(messages);
+        });
+    };
+    moved(0.0, &mut one);
+    moved(0.5, &mut other);
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = manifest(vec![messages::TagRanges::description(), messages::Path::description()]);
+    std::fs::create_dir(folder.path().join("b")).unwrap();
+    let a = recorded(folder.path(), &manifest, &one, 7);
+    let b = recorded(&folder.path().join("b"), &manifest, &other, 7);
+    let tally = compare_topics(&a, &b, &["tagranges/0".to_owned()]).unwrap().remove(0);
+    let [field] = tally.fields.as_slice() else { panic!("{tally:#?}") };
+    assert_eq!((field.field.as_str(), field.messages, field.mean, field.largest), ("x_m", 2, 0.75, 1.0));
 }
 
 #[track_caller]
