@@ -43,8 +43,11 @@ fn a_new_service_passes_its_tests_and_runs_in_a_graph() {
     check(&cargo(&["fmt", "--check"]));
 
     let graph = folder.path().join("robot.toml");
+    // Files that a part names count from the folder of the graph that includes it.
+    let world = sources.join("launch/worlds/cs-building.toml");
     let text = format!(
-        "[graph]\nname = \"speed\"\ninclude = [{:?}]\n\n[speed-meter]\nrun = {:?}\ntime_constant_s = 0.5\n",
+        "[graph]\nname = \"speed\"\ninclude = [{:?}]\n\n[graph.defaults]\nworld = {world:?}\n\n[graph.view]\nworld = {world:?}\n\n\
+         [speed-meter]\nrun = {:?}\ntime_constant_s = 0.5\n",
         sources.join("launch/graphs/coffee.toml"),
         target.join("debug/speed-meter")
     );
