@@ -25,7 +25,7 @@ pub struct MotionCommand {
     pub distance_m: f64,
     /// How far to turn, counter-clockwise; more than π is the long way.
     pub turn_rad: f64,
-    /// No more than this may the robot drive back when it comes too near to a wall; not negative.
+    /// So much is free behind the robot where the motion begins: no farther may it drive back when it comes too near to a wall.
     pub retreat_m: f64,
     /// What to do.
     pub kind: MotionKind,

@@ -1,0 +1,171 @@
+//! What the robot may touch: the walls of the map, or what a scan has shown of them.
+
+use geometry::{Point2, Polygon, Pose2, Scene, Segment, Walls, World, angle};
+use messages::RangeScan;
+
+/// Turns are looked at in steps of this.
+const TURN_STEP_RAD: f64 = 0.07;
+/// Ways are looked at in steps of this.
+const WAY_STEP_M: f64 = 0.02;
+/// Readings on either side of a reading among which the middle one counts: a single late echo opens no gap.
+const MEDIAN_HALF: usize = 2;
+
+/// Walls, and the body that must not touch them.
+#[derive(Debug, Clone)]
+pub(crate) struct Arena {
+    scene: Scene,
+    outline: Option<Polygon>,
+    footprint: Polygon,
+}
+
+impl Arena {
+    /// The first floor of a world.
+    pub(crate) fn of_world(world: &World, footprint: Polygon) -> Self {
+        let floor = world.floors.first();
+        let walls = floor.map(|floor| world.wall_segments(floor.number)).unwrap_or_default();
+        let outline = floor.and_then(geometry::world::Floor::outline_polygon);
+        Self { scene: Scene::new(walls), outline, footprint }
+    }
+
+    /// What a raw scan shows, in the frame of the robot that took it. `None` for a scan that shows nothing.
+    pub(crate) fn of_scan(scan: &RangeScan, ranges: &[f32], footprint: Polygon) -> Option<Self> {
+        scan.check().ok()?;
+        let count = ranges.len();
+        if !(8..=100_000).contains(&count) || !scan.range_max_m.is_finite() {
+            return None;
+        }
+        let reading = |index: usize| scan.beam(ranges, index % count).map_or(scan.range_max_m, |beam| beam.1);
+        let corner = |index: usize| {
+            let mut around: Vec<f64> =
+                (0..=2 * MEDIAN_HALF).map(|beside| reading(index + count + beside - MEDIAN_HALF)).collect();
+            around.sort_by(f64::total_cmp);
+            let direction_rad =
+                scan.sensor_heading_rad + scan.angle_min_rad + index as f64 * scan.angle_step_rad;
+            let (sine, cosine) = direction_rad.sin_cos();
+            Point2::new(around[MEDIAN_HALF] * cosine, around[MEDIAN_HALF] * sine)
+        };
+        let corners: Vec<_> = (0..count).map(corner).collect();
+        let walls = (0..count).map(|index| Segment::new(corners[index], corners[(index + 1) % count]));
+        Some(Self { scene: Scene::new(walls), outline: None, footprint })
+    }
+
+    /// The closed line around the free space, where the world has one.
+    pub(crate) fn outline(&self) -> Option<&Polygon> {
+        self.outline.as_ref()
+    }
+
+    /// The walls.
+    pub(crate) fn walls(&self) -> &Walls {
+        self.scene.walls()
+    }
+
+    /// Room around the body at a pose; infinite without walls.
+    pub(crate) fn room_m(&self, pose: Pose2) -> f64 {
+        self.scene.clearance_m(&self.footprint, pose, [0.0, 1.0], None)
+    }
+
+    /// The least room around the body while it turns.
+    pub(crate) fn turning_room_m(&self, pose: Pose2, turn_rad: f64) -> f64 {
+        let steps = (turn_rad.abs() / TURN_STEP_RAD).ceil().clamp(1.0, 200.0) as u32;
+        let at = |step: u32| f64::from(step) / f64::from(steps) * turn_rad;
+        (0..=steps)
+            .map(|step| self.room_m(Pose2::new(pose.x_m, pose.y_m, pose.heading_rad + at(step))))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// The least room around the body while it drives straight.
+    pub(crate) fn driving_room_m(&self, pose: Pose2, way_m: f64) -> f64 {
+        let steps = (way_m.abs() / WAY_STEP_M).ceil().clamp(1.0, 500.0) as u32;
+        let at = |step: u32| f64::from(step) / f64::from(steps) * way_m;
+        (0..=steps)
+            .map(|step| self.room_m(pose.compose(Pose2::new(at(step), 0.0, 0.0))))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Distance of a straight way from the nearest wall.
+    pub(crate) fn beside_m(&self, from: Point2<f64>, to: Point2<f64>) -> f64 {
+        let way = Segment::new(from, to);
+        let walls = self.walls().segments().iter();
+        walls.map(|wall| wall.distance_to_segment_m(&way)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether a place is free, and how far it is from the nearest wall: zero outside.
+    pub(crate) fn free_m(&self, place: Point2<f64>) -> f64 {
+        if self.outline.as_ref().is_some_and(|outline| !outline.contains(place)) {
+            return 0.0;
+        }
+        self.walls().distance_m(place)
+    }
+
+    /// How far the robot can drive back, up to `most_m`, with `margin_m` left.
+    pub(crate) fn retreat_m(&self, pose: Pose2, most_m: f64, margin_m: f64) -> f64 {
+        let steps = (most_m / WAY_STEP_M).ceil().max(1.0) as u32;
+        let mut free_m = 0.0;
+        for step in 1..=steps {
+            let way_m = most_m * f64::from(step) / f64::from(steps);
+            if self.room_m(pose.compose(Pose2::new(-way_m, 0.0, 0.0))) < margin_m {
+                break;
+            }
+            free_m = way_m;
+        }
+        free_m
+    }
+}
+
+/// What has to be done before the robot can drive straight to a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Manoeuvre {
+    /// First so far ahead, or back, to where there is room for the turn.
+    pub(crate) first_m: f64,
+    /// Then so far around.
+    pub(crate) turn_rad: f64,
+    /// The least room on the way.
+    pub(crate) room_m: f64,
+}
+
+/// How far the robot may go to find room for a turn.
+const FIRST_M: [f64; 13] =
+    [0.0, 0.02, -0.02, 0.04, -0.04, 0.06, -0.06, 0.08, -0.08, 0.10, -0.10, 0.13, -0.13];
+/// A metre of detour is worth this much turning.
+const RAD_PER_M: f64 = 30.0;
+/// Smaller turns are none.
+const NO_TURN_RAD: f64 = 0.004;
+
+impl Arena {
+    /// The cheapest way to look along what `wanted_rad` says for a place, in the map, with room for the body; the roomiest where there is
+    /// not enough. Either way around is tried.
+    pub(crate) fn manoeuvre(
+        &self,
+        pose: Pose2,
+        margin_m: f64,
+        wanted_rad: impl Fn(Point2<f64>) -> f64,
+    ) -> Manoeuvre {
+        let options = FIRST_M.into_iter().flat_map(|first_m| {
+            let from = pose.compose(Pose2::new(first_m, 0.0, 0.0));
+            let short_rad = angle::difference(wanted_rad(from.position()), pose.heading_rad);
+            let long_rad = short_rad - std::f64::consts::TAU.copysign(short_rad);
+            [(first_m, from, short_rad), (first_m, from, long_rad)]
+        });
+        let mut best: Option<(f64, Manoeuvre)> = None;
+        for (first_m, from, turn_rad) in options {
+            let cost = first_m.abs() * RAD_PER_M + turn_rad.abs();
+            let enough = |(_, found): &(f64, Manoeuvre)| found.room_m >= margin_m;
+            if best.as_ref().is_some_and(|best| enough(best) && best.0 <= cost) {
+                continue;
+            }
+            let turn_rad = if turn_rad.abs() < NO_TURN_RAD { 0.0 } else { turn_rad };
+            let way_room_m = if first_m == 0.0 { f64::INFINITY } else { self.driving_room_m(pose, first_m) };
+            let turn_room_m = if turn_rad == 0.0 { f64::INFINITY } else { self.turning_room_m(from, turn_rad) };
+            let found = (cost, Manoeuvre { first_m, turn_rad, room_m: way_room_m.min(turn_room_m) });
+            let better = match &best {
+                None => true,
+                Some(best) if enough(best) => enough(&found),
+                Some(best) => found.1.room_m > best.1.room_m,
+            };
+            if better {
+                best = Some(found);
+            }
+        }
+        best.map_or(Manoeuvre { first_m: 0.0, turn_rad: 0.0, room_m: 0.0 }, |(_, found)| found)
+    }
+}
