@@ -4,7 +4,7 @@
 //! for ever. Services only open them.
 
 use crate::janitor;
-use crate::manifest::Manifest;
+use crate::manifest::{Manifest, Topic};
 use crate::place::{self, InvalidBoardName, Place, Turn};
 use crate::switchboard::{self, SlotState, Switchboard};
 use crate::transport::{Member, RawTopic, TopicShape, TransportError};
@@ -54,6 +54,16 @@ pub enum HostError {
 /// What a service's health is published on.
 pub fn health_topic(role: &str) -> String {
     format!("health/{role}")
+}
+
+/// The name under which a shadow of `role` publishes: a process that is compared with the one that plays the role.
+pub fn shadow_role(role: &str) -> String {
+    format!("{role}-shadow")
+}
+
+/// Where a shadow publishes what it would say on `topic`.
+pub fn shadow_topic(topic: &str) -> String {
+    format!("shadow/{topic}")
 }
 
 /// A board that this process has made and keeps alive.
@@ -107,12 +117,7 @@ impl Host {
         let member = Member::join(&place)?;
         let mut topics = Vec::with_capacity(manifest.topics.len());
         for topic in &manifest.topics {
-            let shape = TopicShape {
-                fingerprint: topic.message.fingerprint(),
-                depth: topic.depth,
-                readers: topic.readers.len() + SPARE_READERS,
-            };
-            topics.push(member.create(&topic.name, shape)?);
+            topics.push(member.create(&topic.name, shape_of(topic))?);
         }
         let manifest = Manifest { launcher_pid: std::process::id(), ..manifest };
         manifest.write(&place)?;
@@ -140,6 +145,30 @@ impl Host {
     /// The table of contents.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest
+    }
+
+    /// Adds topics to the board, for newcomers; who has joined already does not know them. Those that are there stay as they are.
+    ///
+    /// # Errors
+    /// When the board holds no more, or shared memory fails.
+    pub fn add_topics(&mut self, topics: Vec<Topic>) -> Result<(), HostError> {
+        let Some(member) = &self.member else { return Ok(()) };
+        let mut manifest = self.manifest.clone();
+        for topic in topics {
+            if manifest.topic(&topic.name).is_some() {
+                continue;
+            }
+            if manifest.topics.len() == switchboard::TOPICS {
+                return Err(HostError::TooManyTopics { topics: switchboard::TOPICS + 1 });
+            }
+            self.topics.push(member.create(&topic.name, shape_of(&topic))?);
+            manifest.topics.push(topic);
+        }
+        if manifest.topics.len() > self.manifest.topics.len() {
+            manifest.write(&self.place)?;
+            self.manifest = manifest;
+        }
+        Ok(())
     }
 
     /// Prepares a slot for a service that is about to be started, with a generation of its own, and gives it the right to publish
@@ -196,6 +225,14 @@ impl Drop for Host {
         {
             tracing::warn!(board = self.place.name(), %error, "something of the board is left behind");
         }
+    }
+}
+
+fn shape_of(topic: &Topic) -> TopicShape {
+    TopicShape {
+        fingerprint: topic.message.fingerprint(),
+        depth: topic.depth,
+        readers: topic.readers.len() + SPARE_READERS,
     }
 }
 

@@ -4,6 +4,7 @@
 //! This is the only crate that knows the transport, signals and the clock.
 
 pub mod clock;
+pub mod gate;
 pub mod host;
 pub mod manifest;
 pub mod place;

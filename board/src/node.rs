@@ -1,7 +1,8 @@
 //! A service's node: where its ports are declared, and what wakes it.
 
+use crate::host::{health_topic, shadow_role, shadow_topic};
 use crate::interface::{Direction, PortDescription};
-use crate::kept::Kept;
+use crate::kept::{Home, Kept};
 use crate::manifest::Manifest;
 use crate::place::Place;
 use crate::port::{Latest, Publisher, PublisherLink, Queue, Reader, ReaderLink};
@@ -177,6 +178,8 @@ impl Joined {
 pub struct Node {
     role: String,
     pub(crate) joined: Option<Joined>,
+    /// It publishes beside the topics of its role, to be compared.
+    is_shadow: bool,
     pub(crate) ports: Vec<PortDescription>,
     pub(crate) wakes: Vec<u32>,
     pub(crate) period: Option<Duration>,
@@ -184,11 +187,18 @@ pub struct Node {
 
 impl Node {
     pub(crate) fn describing(role: &str) -> Self {
-        Self { role: role.to_owned(), joined: None, ports: Vec::new(), wakes: Vec::new(), period: None }
+        Self {
+            role: role.to_owned(),
+            joined: None,
+            is_shadow: false,
+            ports: Vec::new(),
+            wakes: Vec::new(),
+            period: None,
+        }
     }
 
-    pub(crate) fn joined(role: &str, joined: Joined) -> Self {
-        Self { joined: Some(joined), ..Self::describing(role) }
+    pub(crate) fn joined(role: &str, joined: Joined, is_shadow: bool) -> Self {
+        Self { joined: Some(joined), is_shadow, ..Self::describing(role) }
     }
 
     /// The service's name in the graph.
@@ -284,6 +294,9 @@ impl Node {
         self.describe::<T>(topic, Direction::Publish, true, 0);
         let role = self.role.clone();
         let Some(joined) = &mut self.joined else { return Ok(Publisher::new(topic, None)) };
+        let (role, topic) =
+            if self.is_shadow { (shadow_role(&role), shadow_topic(topic)) } else { (role, topic.to_owned()) };
+        let topic = topic.as_str();
         let fingerprint = joined.check_layout::<T>(topic)?;
         let owner = joined.manifest.topic(topic).and_then(|(_, entry)| entry.publisher.clone());
         if let Some(publisher) = owner.filter(|owner| *owner != role) {
@@ -321,8 +334,16 @@ impl Node {
     }
 
     /// A state that outlives the process: saved by its predecessor of the same role, restored after a crash or a swap.
+    ///
+    /// A newcomer restores what its predecessor has saved so far, and saves nothing of its own before it takes over.
     pub fn kept<S: Serialize + DeserializeOwned>(&self) -> Kept<S> {
-        Kept::new(self.joined.as_ref().map(|joined| joined.place.file(&format!("state-{}.json", self.role))))
+        let health = health_topic(&self.role);
+        let home = self.joined.as_ref().and_then(|joined| {
+            let (health, _) = joined.manifest.topic(&health)?;
+            let file = joined.place.file(&format!("state-{}", self.role));
+            Some(Home { file, shared: Rc::clone(&joined.shared), health })
+        });
+        Kept::new(home)
     }
 
     fn reader<T: Message>(

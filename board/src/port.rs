@@ -8,6 +8,9 @@ use std::rc::Rc;
 use std::sync::atomic::Ordering;
 use zerocopy::FromBytes as _;
 
+/// Lockstep: the round of messages from outside. They are published between two instants, and seen from the next one on.
+pub const OUTSIDE_ROUND: u32 = u32::MAX;
+
 /// A port that reads a topic.
 pub trait Reader {
     /// The topic's name.
@@ -209,7 +212,28 @@ impl PublisherLink {
         entry.is_some_and(|entry| entry.generation.load(Ordering::Acquire) == self.shared.generation)
     }
 
+    /// A newcomer that may: this topic is its own from this message on, so that not even one is missed. Whoever else is mute counts what it would have said.
+    #[cold]
+    fn takes_over(&self) -> bool {
+        let Some(slot) = self.shared.own_slot() else { return false };
+        slot.muted.fetch_add(1, Ordering::Relaxed);
+        if slot.may_take_over.load(Ordering::Acquire) == 0 {
+            return false;
+        }
+        let Some(entry) = self.shared.switchboard.topic(self.topic) else { return false };
+        // The launcher may have started a successor in between, whose generation is newer.
+        let before = entry.generation.fetch_max(self.shared.generation, Ordering::AcqRel);
+        if before > self.shared.generation {
+            return false;
+        }
+        entry.publisher.store(self.shared.slot, Ordering::Release);
+        true
+    }
+
     pub(crate) fn send(&self, loan: RawLoan) -> Result<(), TransportError> {
+        if !self.is_heard() && !self.takes_over() {
+            return Ok(());
+        }
         let now = self.shared.clock();
         let origin = if self.measures { now } else { self.shared.origin(now) };
         self.send_stamped(loan, now, origin)
@@ -221,18 +245,36 @@ impl PublisherLink {
         stamp: Time,
         origin: Time,
     ) -> Result<(), TransportError> {
-        if self.is_heard() {
-            self.send_in_generation(loan, stamp, origin, self.shared.generation)
-        } else {
-            Ok(())
+        if !self.is_heard() {
+            return Ok(());
         }
+        if self.shared.computes.get() {
+            self.hold(loan, origin);
+            return Ok(());
+        }
+        self.send_in_generation(loan, stamp, origin, self.shared.generation)
     }
 
-    /// For tools: in the name of whoever publishes the topic.
+    /// Keeps a message until its step has been computed. A copy, since the transport lends each publisher few places at once.
+    fn hold(&self, mut loan: RawLoan, origin: Time) {
+        let bytes = loan.bytes().to_vec();
+        let publisher = Rc::clone(&self.publisher);
+        self.shared.held.borrow_mut().push(Held { topic: self.topic, publisher, bytes, origin });
+    }
+
+    /// For tools: in the name of whoever publishes the topic. In lockstep after the last round of the present instant.
     pub(crate) fn send_as_outsider(&self, loan: RawLoan, stamp: Time) -> Result<(), TransportError> {
-        let entry = self.shared.switchboard.topic(self.topic);
-        let generation = entry.map_or(0, |entry| entry.generation.load(Ordering::Acquire));
-        self.send_in_generation(loan, stamp, stamp, generation)
+        let Some(entry) = self.shared.switchboard.topic(self.topic) else { return Ok(()) };
+        self.send_as(
+            loan,
+            Envelope {
+                stamp_ns: stamp.as_nanos(),
+                origin_ns: stamp.as_nanos(),
+                sequence: entry.count.load(Ordering::Relaxed).wrapping_add(1),
+                generation: entry.generation.load(Ordering::Acquire),
+                round: if self.shared.lockstep { OUTSIDE_ROUND } else { 0 },
+            },
+        )
     }
 
     fn send_in_generation(
@@ -244,20 +286,52 @@ impl PublisherLink {
     ) -> Result<(), TransportError> {
         let Some(entry) = self.shared.switchboard.topic(self.topic) else { return Ok(()) };
         let sequence = entry.count.load(Ordering::Relaxed).wrapping_add(1);
-        loan.send(Envelope {
-            stamp_ns: stamp.as_nanos(),
-            origin_ns: origin.as_nanos(),
-            sequence,
-            generation,
-            round: self.shared.round(),
-        })?;
-        entry.last_stamp_ns.store(stamp.as_nanos(), Ordering::Relaxed);
-        entry.count.store(sequence, Ordering::Release);
+        self.send_as(
+            loan,
+            Envelope {
+                stamp_ns: stamp.as_nanos(),
+                origin_ns: origin.as_nanos(),
+                sequence,
+                generation,
+                round: self.shared.round(),
+            },
+        )
+    }
+
+    /// With all that lies in front of it given.
+    pub(crate) fn send_as(&self, loan: RawLoan, envelope: Envelope) -> Result<(), TransportError> {
+        let Some(entry) = self.shared.switchboard.topic(self.topic) else { return Ok(()) };
+        loan.send(envelope)?;
+        entry.last_stamp_ns.store(envelope.stamp_ns, Ordering::Relaxed);
+        entry.count.store(envelope.sequence, Ordering::Release);
         // In lockstep the conductor says whose turn it is.
         if !self.shared.lockstep {
             self.shared.switchboard.ring_readers(self.topic);
         }
         Ok(())
+    }
+}
+
+/// A message of a step that is still being computed.
+pub(crate) struct Held {
+    topic: u32,
+    publisher: Rc<RawPublisher>,
+    bytes: Vec<u8>,
+    origin: Time,
+}
+
+/// Publishes what was held back while the step was computed, in the moment that [`Shared::begin_step`] has set.
+pub(crate) fn release_held(shared: &Rc<Shared>) {
+    let held = std::mem::take(&mut *shared.held.borrow_mut());
+    for Held { topic, publisher, bytes, origin } in held {
+        let link = PublisherLink { shared: Rc::clone(shared), topic, publisher, measures: false };
+        let sent = link.loan(bytes.len()).and_then(|mut loan| {
+            loan.bytes().copy_from_slice(&bytes);
+            link.send_in_generation(loan, shared.clock(), origin, shared.generation)
+        });
+        if let Err(error) = sent {
+            tracing::error!(topic, %error, "message lost");
+        }
     }
 }
 

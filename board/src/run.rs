@@ -5,11 +5,11 @@ use crate::example;
 use crate::health::StepTimes;
 use crate::host;
 use crate::interface::{About, Interface};
-use crate::node::{Joined, Node};
+use crate::node::{JoinError, Joined, Node};
 use crate::place::Place;
-use crate::port::{PublisherLink, bytes_of};
+use crate::port::{PublisherLink, bytes_of, release_held};
 use crate::shared::Shared;
-use crate::switchboard::{self, SlotState};
+use crate::switchboard::{self, Slot, SlotState};
 use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
 use messages::{Health, Message as _, Parameters, ServiceState, Time};
 use std::error::Error;
@@ -24,6 +24,8 @@ type Step = Box<dyn FnMut(Time)>;
 
 /// A service ends with this code when its set-up is wrong: starting it again would not help.
 pub const EXIT_SETUP: u8 = 2;
+/// A service ends with this code when the board had no room for it: another time it may have.
+const EXIT_FAILED: u8 = 1;
 /// Longest sleep: how often a waiting process shows that it lives.
 const HEARTBEAT: Duration = Duration::from_millis(100);
 const HEALTH_PERIOD: Duration = Duration::from_secs(1);
@@ -68,9 +70,14 @@ fn run_with(
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::from(EXIT_SETUP)
+            ExitCode::from(if passes_by(&*error) { EXIT_FAILED } else { EXIT_SETUP })
         }
     }
+}
+
+/// Whether an error is the board's and not the set-up's, so that another start may help.
+fn passes_by(error: &(dyn Error + Send + Sync + 'static)) -> bool {
+    matches!(error.downcast_ref(), Some(JoinError::Transport(_) | JoinError::Full { .. }))
 }
 
 fn command(about: About) -> Command {
@@ -85,6 +92,14 @@ fn command(about: About) -> Command {
         .arg(text("role", "ROLE", "The service's name in the graph [default: the binary's name]"))
         .arg(text("params", "JSON", "Parameters, as a JSON object; see --example").default_value("{}"))
         .arg(text("slot", "N", "The place that the launcher has prepared").value_parser(value_parser!(u32)).hide(true))
+        .arg(
+            Arg::new("shadow")
+                .long("shadow")
+                .action(ArgAction::SetTrue)
+                .hide(true)
+                .help("Publish beside the topics of the role, to be compared"),
+        )
+        .arg(text("compute-ns", "N", "In lockstep: how long a step takes").value_parser(value_parser!(u64)).hide(true))
         .arg(text("cpu", "N", "Run on this processor only").value_parser(value_parser!(usize)).action(ArgAction::Append))
         .arg(text("fifo", "PRIORITY", "Real-time priority, 1 to 99").value_parser(value_parser!(i32).range(1..=99)))
         .arg(
@@ -149,10 +164,12 @@ fn serve(
     apply_scheduling(arguments)?;
     let shared = Rc::clone(&joined.shared);
     catch_signals(&shared)?;
-    let mut node = Node::joined(&role, joined);
+    let is_shadow = arguments.get_flag("shadow");
+    let mut node = Node::joined(&role, joined, is_shadow);
     let step = make(&mut node, parameters(arguments)?)?;
     let Some(mut joined) = node.joined.take() else { return Ok(()) };
-    let health = open_health(&mut joined, &role)?;
+    let name = if is_shadow { host::shadow_role(&role) } else { role };
+    let health = open_health(&mut joined, &name)?;
     let mut service = Service {
         shared: Rc::clone(&shared),
         wakes: node.wakes.iter().map(|&topic| (topic, 0)).collect(),
@@ -165,6 +182,7 @@ fn serve(
         late_steps: 0,
         health,
     };
+    shared.computes.set(shared.lockstep && arguments.get_one::<u64>("compute-ns").is_some_and(|&ns| ns > 0));
     for &(topic, _) in &service.wakes {
         if let Some(entry) = shared.switchboard.topic(topic) {
             entry.set_wake(shared.slot, true);
@@ -260,6 +278,7 @@ impl Service {
         let Some(slot) = shared.own_slot() else { return };
         let header = shared.switchboard.header();
         let mut turn = slot.done.load(Ordering::Acquire);
+        let mut computing = false;
         slot.next_due_ns.store(0, Ordering::Release);
         slot.set_state(SlotState::Running);
         switchboard::ring(&header.conductor_bell, &header.conductor_sleeps);
@@ -267,6 +286,7 @@ impl Service {
             let heard = slot.bell();
             let given = slot.turn.load(Ordering::Acquire);
             if given == turn {
+                self.serve_new_readers();
                 slot.wait(heard, Some(HEARTBEAT));
                 continue;
             }
@@ -274,21 +294,33 @@ impl Service {
             let now = Time::from_nanos(header.logical_ns.load(Ordering::Acquire));
             let round = header.round.load(Ordering::Acquire);
             self.serve_new_readers();
-            self.take_step(now, round);
-            if let Some(period) = self.period
-                && slot.next_due_ns.load(Ordering::Relaxed) <= now.as_nanos()
-            {
-                let period = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX).max(1);
-                slot.next_due_ns
-                    .store((now.as_nanos() / period + 1).saturating_mul(period), Ordering::Release);
-            } else if self.period.is_none() {
-                slot.next_due_ns.store(u64::MAX, Ordering::Release);
+            // On a slow computer the turn after a step is that in which its messages are seen.
+            if std::mem::take(&mut computing) {
+                shared.begin_step(now, round);
+                release_held(&shared);
+            } else {
+                self.take_step(now, round);
+                self.set_timer(slot, now);
+                computing = shared.computes.get();
             }
             slot.steps.store(self.steps, Ordering::Relaxed);
             slot.done.store(turn, Ordering::Release);
             if header.outstanding.fetch_sub(1, Ordering::AcqRel) == 1 {
                 switchboard::ring(&header.conductor_bell, &header.conductor_sleeps);
             }
+        }
+        // A step that was not computed to its end has published nothing, and its ports must close.
+        shared.held.borrow_mut().clear();
+    }
+
+    fn set_timer(&self, slot: &Slot, now: Time) {
+        if let Some(period) = self.period
+            && slot.next_due_ns.load(Ordering::Relaxed) <= now.as_nanos()
+        {
+            let period = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX).max(1);
+            slot.next_due_ns.store((now.as_nanos() / period + 1).saturating_mul(period), Ordering::Release);
+        } else if self.period.is_none() {
+            slot.next_due_ns.store(u64::MAX, Ordering::Release);
         }
     }
 
@@ -332,6 +364,9 @@ impl Service {
             self.topology = topology;
             for link in &self.publishers {
                 link.publisher.update();
+            }
+            if let Some(slot) = self.shared.own_slot() {
+                slot.served.store(topology, Ordering::Release);
             }
         }
     }

@@ -1,16 +1,16 @@
 //! What the ports of one process share: the switchboard, the moment of the present step, and the counters of its health.
 
 use crate::clock;
+use crate::port::Held;
 use crate::switchboard::{Slot, Switchboard};
 use messages::Time;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::sync::atomic::Ordering;
 
 /// How far a stamp may lie ahead of the last look at the clock.
 const FUTURE: std::time::Duration = std::time::Duration::from_millis(5);
 
 /// The state behind all ports of a node. Ports stay in their thread.
-#[derive(Debug)]
 pub(crate) struct Shared {
     pub(crate) switchboard: Switchboard,
     pub(crate) slot: u32,
@@ -23,6 +23,10 @@ pub(crate) struct Shared {
     looked: Cell<Time>,
     /// The oldest origin among the messages read in this step.
     origin: Cell<Option<Time>>,
+    /// Lockstep: whether the service computes for a while, so that what it publishes is seen later.
+    pub(crate) computes: Cell<bool>,
+    /// What was published in the step that is still being computed.
+    pub(crate) held: RefCell<Vec<Held>>,
     pub(crate) lost: Cell<u64>,
     pub(crate) invalid: Cell<u64>,
     pub(crate) oldest_input_ns: Cell<u64>,
@@ -40,6 +44,8 @@ impl Shared {
             round: Cell::new(0),
             looked: Cell::new(Time::ZERO),
             origin: Cell::new(None),
+            computes: Cell::new(false),
+            held: RefCell::default(),
             lost: Cell::new(0),
             invalid: Cell::new(0),
             oldest_input_ns: Cell::new(0),

@@ -20,7 +20,7 @@ use std::time::Duration;
 pub const SLOTS: usize = 128;
 /// Topics on one board at the most.
 pub const TOPICS: usize = 256;
-const MAGIC: u64 = 0x6b72_6f63_0000_0005;
+const MAGIC: u64 = 0x6b72_6f63_0000_0006;
 const ROLE_BYTES: usize = 48;
 /// Stands for no slot.
 pub const NO_SLOT: u32 = u32::MAX;
@@ -74,7 +74,8 @@ pub struct Header {
     pub conductor_sleeps: AtomicU32,
     /// The next generation number of a publisher.
     pub generations: AtomicU32,
-    reserved: AtomicU32,
+    /// Lockstep: who may publish from outside, and when; see [`gate`](crate::gate).
+    pub gate: AtomicU32,
 }
 
 /// One process.
@@ -97,12 +98,18 @@ pub struct Slot {
     pub done: AtomicU32,
     /// 1 when this is a service of the graph, 0 for a tool.
     pub is_service: AtomicU32,
+    /// The topology up to which it has served the readers that joined.
+    pub served: AtomicU32,
     /// When it last looked about, in nanoseconds of the host's clock.
     pub heartbeat_ns: AtomicU64,
     /// When its present step began; zero between steps.
     pub step_since_ns: AtomicU64,
     /// Steps taken.
     pub steps: AtomicU64,
+    /// Messages that it has published while nobody was to hear it: a newcomer's, before it takes over.
+    pub muted: AtomicU64,
+    /// 1 when it may take over the topics of its role, each with its next message: the last step of a swap.
+    pub may_take_over: AtomicU32,
     /// When its next timer is due; `u64::MAX` without one.
     pub next_due_ns: AtomicU64,
     role: [AtomicU8; ROLE_BYTES],
@@ -353,11 +360,13 @@ impl Slot {
     /// Prepares the slot for a new process.
     pub fn reset(&self, pid: u32) {
         self.pid.store(pid, Ordering::Relaxed);
-        for counter in [&self.heartbeat_ns, &self.step_since_ns, &self.steps] {
+        for counter in [&self.heartbeat_ns, &self.step_since_ns, &self.steps, &self.muted] {
             counter.store(0, Ordering::Relaxed);
         }
+        self.may_take_over.store(0, Ordering::Relaxed);
         self.next_due_ns.store(u64::MAX, Ordering::Relaxed);
         self.sleeps.store(0, Ordering::Relaxed);
+        self.served.store(0, Ordering::Relaxed);
         self.done.store(self.turn.load(Ordering::Relaxed), Ordering::Relaxed);
         self.state.store(SlotState::Starting as u32, Ordering::Release);
     }

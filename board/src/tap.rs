@@ -1,16 +1,19 @@
 //! The board from outside: for tools, recorders, bridges and tests, which read and publish topics that they know by name alone.
 
 use crate::clock;
+use crate::gate;
 use crate::manifest::{Manifest, Topic};
 use crate::node::{JoinError, Joined};
 use crate::place::Place;
 use crate::port::{PublisherLink, ReaderLink};
 use crate::switchboard::{SlotState, Switchboard};
-use crate::transport::{Envelope, RawMessage};
+use crate::transport::{Envelope, RawMessage, TransportError};
 use messages::Time;
 use std::cell::Cell;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
+
+pub use crate::port::OUTSIDE_ROUND;
 
 /// A tool's place on a board.
 pub struct Tap {
@@ -76,13 +79,18 @@ impl Tap {
     /// Sleeps until a topic that is read has a new message, at most for `timeout`. Look for messages first: `heard` is the bell before the look.
     /// Readers that have joined since get the last message of each publisher of this tap.
     pub fn wait(&self, heard: u32, timeout: Duration) {
-        let topology = self.switchboard().header().topology.load(Ordering::Acquire);
-        if self.topology.replace(topology) != topology {
-            self.joined.publishers.iter().for_each(|link| link.publisher.update());
-        }
+        self.serve_new_readers();
         if let Some(slot) = self.joined.shared.own_slot() {
             slot.heartbeat_ns.store(clock::monotonic().as_nanos(), Ordering::Relaxed);
             slot.wait(heard, Some(timeout));
+        }
+    }
+
+    /// Gives readers that have joined since the last message of each publisher of this tap.
+    pub fn serve_new_readers(&self) {
+        let topology = self.switchboard().header().topology.load(Ordering::Acquire);
+        if self.topology.replace(topology) != topology {
+            self.joined.publishers.iter().for_each(|link| link.publisher.update());
         }
     }
 
@@ -150,12 +158,23 @@ impl TapPublisher {
     ///
     /// # Errors
     /// When the transport has no memory left.
-    pub fn publish(&self, bytes: &[u8]) -> Result<(), crate::transport::TransportError> {
+    pub fn publish(&self, bytes: &[u8]) -> Result<(), TransportError> {
         let mut loan = self.link.loan(bytes.len())?;
         loan.bytes().copy_from_slice(bytes);
+        let board = &self.link.shared.switchboard;
         // Host time would lie in a lockstep's far future, and block the readers for ever.
-        let now = now(&self.link.shared.switchboard);
-        self.link.send_as_outsider(loan, now)
+        let send = || self.link.send_as_outsider(loan, now(board));
+        if self.link.shared.lockstep { gate::between_instants(board, send) } else { send() }
+    }
+
+    /// Publishes these bytes with this envelope: for whoever has a run's messages on record, and is the conductor's own.
+    ///
+    /// # Errors
+    /// When the transport has no memory left.
+    pub fn publish_as(&self, envelope: Envelope, bytes: &[u8]) -> Result<(), TransportError> {
+        let mut loan = self.link.loan(bytes.len())?;
+        loan.bytes().copy_from_slice(bytes);
+        self.link.send_as(loan, envelope)
     }
 }
 

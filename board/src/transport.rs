@@ -32,8 +32,9 @@ pub struct Envelope {
 
 /// Alignment of every message in shared memory, in bytes.
 const ALIGNMENT: usize = 64;
-/// Publishers on a topic at once: the incumbent, the newcomer of a swap, and a person with `board publish --force`.
-const PUBLISHERS: usize = 3;
+/// Publishers on a topic at once: the incumbent, the newcomer of a swap, a person with `board publish --force`, and the dead that were not
+/// cleaned up after yet.
+const PUBLISHERS: usize = 8;
 
 /// A failure of the transport.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

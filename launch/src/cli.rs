@@ -11,7 +11,9 @@ Examples:
   launch up coffee --swap planner=sampling-planner --seed 7
   launch up coffee --set collision-avoidance.front_radius_m=0.25 --detach
   launch experiment coffee                         many runs, with statistics and plots
+  launch rerun a.mcap                              does a recorded run come out the same?
   launch order 207                                 coffee for room 207, please
+  launch swap controller=window-controller         while it drives
   launch logs planner -f                           follow what the planner says
   launch stop                                      stop the robot, then its services";
 
@@ -43,11 +45,20 @@ pub(crate) enum Command {
     Logs(LogsArgs),
     /// Start a service of a running graph anew
     Restart(RestartArgs),
+    /// Let another service play a role while the robot runs, without a gap
+    #[command(after_help = SWAP_HELP)]
+    Swap(SwapArgs),
     /// Stop a running graph: the robot first, then its services
     Stop(StopArgs),
     /// Run variants of a graph many times in lockstep, and compare them
     #[command(after_help = EXPERIMENT_HELP)]
     Experiment(ExperimentArgs),
+    /// Kill, stop and restart services of a live robot at random, and check that it stays safe and heals
+    #[command(after_help = CHAOS_HELP)]
+    Chaos(ChaosArgs),
+    /// Write a small service to begin with: parameters, step, tests, shell
+    #[command(after_help = NEW_HELP)]
+    New(NewArgs),
     /// Draw services and topics
     #[command(
         after_help = "Examples:\n  launch graph coffee > coffee.mmd\n  launch graph coffee --dot | dot -Tsvg > coffee.svg"
@@ -77,6 +88,9 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Run a recording again: the same graph, or single services on the recorded inputs, and compare
+    #[command(after_help = RERUN_HELP)]
+    Rerun(RerunArgs),
     /// Print completions for a shell
     #[command(
         after_help = "Example:\n  launch completions bash > ~/.local/share/bash-completion/completions/launch"
@@ -110,6 +124,50 @@ Exit code: 0 all runs were done and every expectation of the file holds, 1 other
 Examples:
   launch experiment coffee
   launch experiment ./radii.toml --jobs 1 --out /tmp/radii";
+
+const CHAOS_HELP: &str = "\
+Everybody is hit but the simulator and the referee, which are no part of the robot. After each deed it is checked that the wheels stood in time when
+the victim was in their chain, and that the victim came back; at the end that nothing was touched and nothing is left behind. The robot is kept busy
+with orders where the graph takes them.
+Exit code: 0 everything held, 1 otherwise.
+
+Examples:
+  launch chaos coffee --kills 100
+  launch chaos coffee --kills 1000 --seed 7 --spare planner --json";
+
+const NEW_HELP: &str = "\
+It builds, passes its tests and runs in a graph as it is. In a source checkout it becomes a member of the workspace; in another folder it is a repository of its
+own, and a graph names it by its path.
+
+Examples:
+  launch new door-bell
+  launch new door-bell --in ~/my-robot";
+
+const SWAP_HELP: &str = "\
+The newcomer starts beside the old service, mute. When it takes steps and has something to say, its messages count, and the old one is asked to
+leave. If it dies or refuses its parameters before, the old one goes on as it was.
+A shadow stays mute: what it would say is shown against what the service says, field by field, until Ctrl-C.
+
+Examples:
+  launch swap controller=window-controller
+  launch swap planner=sampling-planner --set robot_radius_m=0.32
+  launch swap controller=window-controller --shadow --for 30
+  launch swap --back controller";
+
+const RERUN_HELP: &str = "\
+Without a change the whole graph runs again, with the recorded seed and whatever came from outside: every message must be the same.
+With --with or --set only the services named there run, and --only adds more; everything that they read comes from the recording, in the very
+instants in which it was said (open loop). What they answer is compared with what was answered then, but does not act upon the world.
+With --closed the whole graph runs anew with the change, so that the change acts upon everything that follows.
+
+Exit code: 0 the same, 1 different, 2 not run.
+
+Examples:
+  launch up coffee --lockstep --seed 7 --record a.mcap
+  launch rerun a.mcap                                     is it the same again?
+  launch rerun a.mcap --only planner                      the planner alone, on the recorded inputs
+  launch rerun a.mcap --with controller=window-controller what would this one have done?
+  launch rerun a.mcap --set controller.track_m=0.42 --closed --record b.mcap";
 
 /// Which graph, and what is different about it this time.
 #[derive(Debug, Clone, Args)]
@@ -203,12 +261,50 @@ pub(crate) struct UpArgs {
     /// In lockstep: record every message into this file (MCAP)
     #[arg(long, value_name = "FILE.mcap", requires = "lockstep", value_hint = clap::ValueHint::FilePath)]
     pub(crate) record: Option<PathBuf>,
+    /// In lockstep: go on only when told to, by lines on the standard input (`advance SECONDS`, `look`, `kill ROLE`, `end`); for tests
+    #[arg(long, requires = "lockstep", hide = true)]
+    pub(crate) steered: bool,
     /// Print the referee's figures as JSON at the end
     #[arg(long)]
     pub(crate) json: bool,
     /// Where the logs of the services go
     #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
     pub(crate) log_dir: Option<PathBuf>,
+}
+
+/// `launch rerun`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RerunArgs {
+    /// The recording, made with `launch up --lockstep --record`
+    #[arg(value_name = "FILE.mcap", value_hint = clap::ValueHint::FilePath)]
+    pub(crate) file: PathBuf,
+    /// Let another binary play a role; any number of times
+    #[arg(long, value_name = "ROLE=BINARY")]
+    pub(crate) with: Vec<String>,
+    /// Give a parameter another value; any number of times
+    #[arg(long, value_name = "ROLE.KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Run this service on the recorded inputs, also if nothing about it has changed; any number of times
+    #[arg(long, value_name = "ROLE", conflicts_with = "closed")]
+    pub(crate) only: Vec<String>,
+    /// Run the whole graph, so that a change acts upon everything that follows
+    #[arg(long)]
+    pub(crate) closed: bool,
+    /// Take this graph instead of the recorded one
+    #[arg(long, value_name = "GRAPH")]
+    pub(crate) graph: Option<String>,
+    /// Record the rerun
+    #[arg(long, value_name = "OUT.mcap", value_hint = clap::ValueHint::FilePath)]
+    pub(crate) record: Option<PathBuf>,
+    /// Name the board otherwise than `rerun-PROCESS`
+    #[arg(long, value_name = "NAME")]
+    pub(crate) board: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// In a source checkout: use what is built already
+    #[arg(long)]
+    pub(crate) no_build: bool,
 }
 
 /// `launch ps` and `launch top`.
@@ -250,6 +346,38 @@ pub(crate) struct RestartArgs {
     pub(crate) running: Running,
 }
 
+/// `launch swap`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SwapArgs {
+    /// The role, and the binary that is to play it (a name, or a path)
+    #[arg(value_name = "ROLE=BINARY", required_unless_present = "back")]
+    pub(crate) swap: Option<String>,
+    /// A parameter of the newcomer; any number of times
+    #[arg(long, value_name = "KEY=VALUE", conflicts_with = "back")]
+    pub(crate) set: Vec<String>,
+    /// Keep it mute, and show how its messages differ
+    #[arg(long, conflicts_with = "back")]
+    pub(crate) shadow: bool,
+    /// With --shadow: end after so many seconds, instead of on Ctrl-C
+    #[arg(long = "for", value_name = "SECONDS", requires = "shadow", value_parser = positive)]
+    pub(crate) length_s: Option<f64>,
+    /// Let it run beside the old one for so many seconds at least
+    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["back", "shadow"], value_parser = positive)]
+    pub(crate) warm_up: Option<f64>,
+    /// Bring back what played this role before, or send its newcomer away
+    #[arg(long, value_name = "ROLE", conflicts_with = "swap")]
+    pub(crate) back: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// In a source checkout: use what is built already
+    #[arg(long)]
+    pub(crate) no_build: bool,
+    /// The board.
+    #[command(flatten)]
+    pub(crate) running: Running,
+}
+
 /// `launch stop`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct StopArgs {
@@ -285,6 +413,46 @@ pub(crate) struct ExperimentArgs {
     /// In a source checkout: use what is built already
     #[arg(long)]
     pub(crate) no_build: bool,
+}
+
+/// `launch chaos`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ChaosArgs {
+    /// The graph.
+    #[command(flatten)]
+    pub(crate) which: Which,
+    /// How many deeds
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) kills: u64,
+    /// Who is not hit; any number of times
+    #[arg(long, value_name = "ROLE")]
+    pub(crate) spare: Vec<String>,
+    /// Name the board otherwise than the graph does
+    #[arg(long, value_name = "NAME")]
+    pub(crate) board: Option<String>,
+    /// Print what happens, a line an event
+    #[arg(long)]
+    pub(crate) events: bool,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Where the logs of the services go
+    #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
+    pub(crate) log_dir: Option<PathBuf>,
+}
+
+/// `launch new`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct NewArgs {
+    /// The service's name: a noun in lower-case letters, digits and hyphens
+    #[arg(value_name = "NAME")]
+    pub(crate) name: String,
+    /// The folder in which its folder is made; `services` of the checkout without
+    #[arg(long = "in", value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
+    pub(crate) folder: Option<PathBuf>,
+    /// The sources of Corkboard, when the launcher was not built from a checkout
+    #[arg(long, value_name = "DIR", value_hint = clap::ValueHint::DirPath)]
+    pub(crate) corkboard: Option<PathBuf>,
 }
 
 /// `launch graph`.

@@ -162,7 +162,8 @@ pub(crate) fn order(args: &OrderArgs) -> Outcome {
     Ok(())
 }
 
-fn status_of(place: &Place) -> Result<Status, String> {
+/// How everything stands on a board.
+pub(crate) fn status_of(place: &Place) -> Result<Status, String> {
     match control::ask(place, &Request::Status)? {
         Answer::Status(status) => Ok(*status),
         _ => Err("the launcher answers something else".to_owned()),
@@ -172,7 +173,10 @@ fn status_of(place: &Place) -> Result<Status, String> {
 fn heading(status: &Status) -> String {
     format!(
         "board {}  graph {}  up {:.0} s  launcher {}",
-        status.board, status.graph, status.uptime_s, status.launcher_pid
+        status.board,
+        crate::graph::shown(Path::new(&status.graph)),
+        status.uptime_s,
+        status.launcher_pid
     )
 }
 

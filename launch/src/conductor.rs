@@ -5,6 +5,7 @@
 //! A step at (time, round) sees exactly what was published before (time, round); the readers see to that. With one publisher a topic,
 //! every run with one seed leaves the same messages, whatever the operating system did meanwhile.
 
+use crate::prompter::Prompter;
 use board::clock;
 use board::host::Host;
 use board::switchboard::{self, SlotState};
@@ -46,6 +47,9 @@ pub(crate) enum Discord {
         /// The instant, in seconds.
         at_s: String,
     },
+    /// The recording that is played cannot be read any further.
+    #[error("{0}")]
+    Prompter(String),
     /// No service has a timer, and nobody publishes: nothing will ever happen again.
     #[error("after {at_s} s no timer is left: nothing will ever happen again")]
     Over {
@@ -73,25 +77,44 @@ pub(crate) struct Conductor {
 struct Player {
     role: String,
     slot: u32,
+    /// How long its computer takes for a step.
+    compute_ns: u64,
+    /// It has taken a step that is being computed until then: only then are its messages seen.
+    computes_until_ns: Option<u64>,
+    /// It gets no turn before: it hangs.
+    hangs_until_ns: u64,
+    /// A topic that it waits for has a new message.
+    is_woken: bool,
+}
+
+impl Player {
+    /// Whether it takes a turn now: a step, or the end of one.
+    fn is_due(&self, now_ns: u64, next_timer_ns: impl FnOnce() -> u64) -> bool {
+        match self.computes_until_ns {
+            _ if self.hangs_until_ns > now_ns => false,
+            Some(until_ns) => until_ns <= now_ns,
+            None => self.is_woken || next_timer_ns() <= now_ns,
+        }
+    }
 }
 
 impl Conductor {
-    /// A conductor for the services on this board, which have joined.
-    pub(crate) fn new(host: &Host) -> Self {
+    /// A conductor for these services, which have joined the board: role, slot, and how long a step takes.
+    pub(crate) fn new(host: &Host, services: impl IntoIterator<Item = (String, u32, Duration)>) -> Self {
         let topics = host.manifest().topics.len() as u32;
-        let players = board::host::services(host.switchboard())
-            .into_iter()
-            .map(|(slot, role, _)| Player { role, slot })
-            .collect();
-        Self {
-            players,
+        let mut conductor = Self {
+            players: Vec::new(),
             topics,
             counts: vec![0; topics as usize],
             now: Time::ZERO,
             begun: false,
             turns: 0,
             instants: 0,
+        };
+        for (role, slot, compute) in services {
+            conductor.admit(&role, slot, compute);
         }
+        conductor
     }
 
     /// The logical moment.
@@ -99,43 +122,111 @@ impl Conductor {
         self.now
     }
 
-    /// Plays the next instant. `after_round` sees the board when a round has ended; `lives` says whether a service's process lives.
+    /// Begins at this moment instead of zero.
+    pub(crate) fn begin_at(&mut self, now: Time) {
+        self.now = now;
+    }
+
+    /// Moves on to a moment at which nothing happens: between the last instant and the next.
+    pub(crate) fn rest_at(&mut self, host: &Host, now: Time) {
+        self.now = self.now.max(now);
+        host.switchboard().header().logical_ns.store(self.now.as_nanos(), Ordering::Release);
+    }
+
+    /// Lets a service that has joined the board take turns.
+    pub(crate) fn admit(&mut self, role: &str, slot: u32, compute: Duration) {
+        self.dismiss(role);
+        self.players.push(Player {
+            role: role.to_owned(),
+            slot,
+            compute_ns: u64::try_from(compute.as_nanos()).unwrap_or(u64::MAX),
+            computes_until_ns: None,
+            hangs_until_ns: 0,
+            is_woken: false,
+        });
+    }
+
+    /// Gives a service no more turns: it is dead.
+    pub(crate) fn dismiss(&mut self, role: &str) {
+        self.players.retain(|player| player.role != role);
+    }
+
+    /// Gives a service no turns before this moment.
+    pub(crate) fn suspend(&mut self, role: &str, until: Time) {
+        for player in self.players.iter_mut().filter(|player| player.role == role) {
+            player.hangs_until_ns = until.as_nanos();
+        }
+    }
+
+    /// When the next instant is, as far as the services know: `None` when no timer is left and nobody was woken.
+    pub(crate) fn next_instant(&mut self, host: &Host) -> Option<Time> {
+        self.note_woken(host);
+        if !self.begun {
+            return Some(self.now);
+        }
+        let now_ns = self.now.as_nanos();
+        let due = |player: &Player| {
+            let due_ns = match player.computes_until_ns {
+                Some(until_ns) => until_ns,
+                // A message from outside waits for the next instant, whoever's it is.
+                None if player.is_woken && player.hangs_until_ns > now_ns => player.hangs_until_ns,
+                None => self.timer_ns(host, player),
+            };
+            due_ns.max(player.hangs_until_ns)
+        };
+        match self.players.iter().map(due).min().unwrap_or(u64::MAX) {
+            u64::MAX if self.players.iter().any(|player| player.is_woken) => {
+                Some(Time::from_nanos(now_ns + 1))
+            }
+            u64::MAX => None,
+            due_ns => Some(Time::from_nanos(due_ns.max(now_ns))),
+        }
+    }
+
+    /// Plays the instant at this moment. `after_round` sees the board when a round has ended; `lives` says whether a service's process lives;
+    /// the prompter says the words of those who are not there.
     ///
     /// # Errors
     /// When the run cannot go on.
     pub(crate) fn play_instant(
         &mut self,
         host: &Host,
+        at: Time,
+        prompter: &mut Prompter<'_>,
         after_round: &mut dyn FnMut(Time, u32),
         lives: &mut dyn FnMut(&str) -> bool,
     ) -> Result<(), Discord> {
         let board = host.switchboard();
-        // What came from outside between two instants wakes its readers in round 0.
-        let mut woken = self.take_woken(host);
-        let next = self.players.iter().map(|player| self.due_ns(host, player)).min().unwrap_or(u64::MAX);
-        if next == u64::MAX && woken.is_empty() {
-            return Err(Discord::Over { at_s: seconds(self.now) });
-        }
-        if self.begun && next != u64::MAX {
-            self.now = Time::from_nanos(next.max(self.now.as_nanos()));
-        }
+        self.note_woken(host);
+        self.now = self.now.max(at);
         self.begun = true;
         self.instants += 1;
-        board.header().logical_ns.store(self.now.as_nanos(), Ordering::Release);
+        let now_ns = self.now.as_nanos();
+        board.header().logical_ns.store(now_ns, Ordering::Release);
         for round in 0..ROUNDS_MAX {
-            let now_ns = self.now.as_nanos();
             let called: Vec<usize> = (0..self.players.len())
                 .filter(|&index| {
                     let player = &self.players[index];
-                    woken.contains(&player.slot) || (round == 0 && self.due_ns(host, player) <= now_ns)
+                    // A timer falls due in round 0, or when a step has been computed meanwhile.
+                    let looks = round == 0 || player.compute_ns > 0;
+                    player.is_due(now_ns, || if looks { self.timer_ns(host, player) } else { u64::MAX })
                 })
                 .collect();
-            if called.is_empty() {
+            if called.is_empty() && !prompter.has_more_at(self.now, round) {
                 return Ok(());
             }
             self.give_turns(host, round, &called, lives)?;
+            for &index in &called {
+                let player = &mut self.players[index];
+                if player.computes_until_ns.take().is_none() {
+                    player.is_woken = false;
+                    player.computes_until_ns =
+                        (player.compute_ns > 0).then(|| now_ns.saturating_add(player.compute_ns));
+                }
+            }
+            prompter.say(self.now, round).map_err(Discord::Prompter)?;
             after_round(self.now, round);
-            woken = self.take_woken(host);
+            self.note_woken(host);
             if round + 1 == ROUNDS_MAX {
                 let roles = called.iter().map(|&index| self.players[index].role.clone()).collect();
                 return Err(Discord::NeverSettles { at_s: seconds(self.now), roles });
@@ -144,26 +235,22 @@ impl Conductor {
         Ok(())
     }
 
-    fn due_ns(&self, host: &Host, player: &Player) -> u64 {
+    fn timer_ns(&self, host: &Host, player: &Player) -> u64 {
         host.switchboard().slot(player.slot).map_or(u64::MAX, |slot| slot.next_due_ns.load(Ordering::Acquire))
     }
 
-    /// The slots that are woken by what was published since the last look.
-    fn take_woken(&mut self, host: &Host) -> Vec<u32> {
-        let mut woken = Vec::new();
+    /// Notes who is woken by what was published since the last look.
+    fn note_woken(&mut self, host: &Host) {
         for topic in 0..self.topics {
             let Some(entry) = host.switchboard().topic(topic) else { continue };
             let count = entry.count.load(Ordering::Acquire);
             if count == std::mem::replace(&mut self.counts[topic as usize], count) {
                 continue;
             }
-            for player in &self.players {
-                if entry.wakes(player.slot) && !woken.contains(&player.slot) {
-                    woken.push(player.slot);
-                }
+            for player in &mut self.players {
+                player.is_woken |= entry.wakes(player.slot);
             }
         }
-        woken
     }
 
     fn give_turns(
@@ -173,6 +260,9 @@ impl Conductor {
         called: &[usize],
         lives: &mut dyn FnMut(&str) -> bool,
     ) -> Result<(), Discord> {
+        if called.is_empty() {
+            return Ok(());
+        }
         let board = host.switchboard();
         let header = board.header();
         header.round.store(round, Ordering::Release);

@@ -1,7 +1,8 @@
 //! How the other commands talk to a running launcher: one JSON line there, one back, over a socket in the board's folder, which belongs to
 //! its owner alone.
 
-use crate::supervise::{Event, Phase};
+use crate::graph::Overrides;
+use crate::supervise::{Event, Phase, SwapRequest, SwapState};
 use board::host;
 use board::place::{self, Place};
 use serde::{Deserialize, Serialize};
@@ -12,10 +13,11 @@ use std::time::Duration;
 const SOCKET: &str = "control.sock";
 /// Nobody may keep the launcher waiting for longer.
 const PATIENCE: Duration = Duration::from_millis(200);
-const LINE_MAX: u64 = 64 * 1024;
+/// A service's description, with the messages of its topics, takes some.
+const LINE_MAX: u64 = 4 * 1024 * 1024;
 
 /// What is asked of the launcher.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Request {
     /// How does everything stand?
@@ -23,6 +25,13 @@ pub(crate) enum Request {
     /// End a service and start it again.
     Restart {
         /// Its name.
+        role: String,
+    },
+    /// Let another service play a role.
+    Swap(Box<SwapRequest>),
+    /// Send the newcomer of a role away, or bring back its predecessor.
+    SwapBack {
+        /// The role.
         role: String,
     },
     /// Stop the robot, then the services.
@@ -55,6 +64,8 @@ pub(crate) struct Status {
     pub(crate) launcher_pid: u32,
     /// Seconds since `up`.
     pub(crate) uptime_s: f64,
+    /// What differs from the graph's file.
+    pub(crate) overrides: Overrides,
     /// Where the logs are.
     pub(crate) logs: String,
     /// The services, in the order of the graph.
@@ -118,6 +129,8 @@ pub(crate) struct ServiceStatus {
     pub(crate) lost_messages: u64,
     /// Messages that could not be read as what they claim to be.
     pub(crate) invalid_messages: u64,
+    /// How its last swap stands.
+    pub(crate) swap: Option<SwapState>,
 }
 
 /// The name of a phase, as people read it.

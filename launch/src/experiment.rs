@@ -177,6 +177,7 @@ fn fingerprint(checked: &Checked, known: &mut HashMap<PathBuf, String>) -> Strin
             hasher.update(content(file).as_bytes());
         }
     }
+    hasher.update(format!("{:?}", checked.faults).as_bytes());
     hasher.finalize().to_hex().to_string()
 }
 

@@ -4,6 +4,7 @@ mod binaries;
 mod build;
 mod check;
 mod diagram;
+mod faults;
 mod file;
 mod find;
 mod problem;
@@ -14,10 +15,13 @@ mod source;
 mod suggest;
 #[cfg(test)]
 mod tests;
+mod text;
 mod topics;
 mod tree;
 
-pub(crate) use check::{Checked, CheckedService, Publisher};
-pub(crate) use file::Overrides;
-pub(crate) use report::{Request, check_command, graph_command, prepare};
+pub(crate) use check::{Checked, CheckedService, CheckedTopic, Publisher};
+pub(crate) use faults::{Fault, FaultKind};
+pub(crate) use file::{Overrides, shown};
+pub(crate) use find::checkout;
+pub(crate) use report::{Request, check_command, graph_command, prepare, prepare_recorded};
 pub(crate) use settings::{Priority, ViewSettings};

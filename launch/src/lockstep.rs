@@ -1,34 +1,53 @@
 //! `launch up --lockstep`: the same processes in logical time.
 
-use crate::conductor::{Conductor, Discord};
 use crate::graph::Checked;
-use crate::monitor::Monitor;
 use crate::observer::Observer;
+use crate::play::Stage;
+use crate::prompter::{Part, Prompter};
 use crate::summary;
-use crate::supervise::{Phase, Supervisor};
+use crate::supervise::Supervisor;
 use crate::up::{Display, Options, Signals};
 use board::clock;
 use board::tap::Tap;
 use messages::{RunState, RunSummary, Time};
-use recording::Digest;
+use recording::{Digest, Recording};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// Between two looks at signals, deaths and the screen.
-const GLANCE: Duration = Duration::from_millis(20);
+type Failure = Box<dyn std::error::Error>;
 
 /// How a run in logical time is to be.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Pace {
     /// Logical seconds a second; `None` for as fast as possible.
     pub(crate) speed: Option<f64>,
-    /// End after so many logical seconds, whatever the referee says.
-    pub(crate) until_s: Option<f64>,
+    /// Begin at this moment.
+    pub(crate) begin: Time,
+    /// End after the instant at this moment, or the first one after it, whatever the referee says.
+    pub(crate) until: Option<Time>,
     /// The processor for the whole graph.
     pub(crate) cpu: Option<usize>,
     /// Record every message here.
     pub(crate) record: Option<PathBuf>,
+    /// What else the recording is to say of itself.
+    pub(crate) notes: BTreeMap<String, String>,
+    /// Say these words of a recording.
+    pub(crate) script: Option<Script>,
+    /// Take orders from the standard input.
+    pub(crate) steered: bool,
+}
+
+/// What is said from a recording.
+#[derive(Debug, Clone)]
+pub(crate) struct Script {
+    /// The recording.
+    pub(crate) file: PathBuf,
+    /// The topics.
+    pub(crate) topics: Vec<String>,
+    /// What is said on them.
+    pub(crate) part: Part,
 }
 
 /// What a run in logical time has come to.
@@ -37,9 +56,11 @@ pub(crate) struct Outcome {
     pub(crate) verdict: Option<RunState>,
     pub(crate) summary: Option<RunSummary>,
     pub(crate) digest: Digest,
-    pub(crate) logical_s: f64,
+    /// The last instant.
+    pub(crate) end: Time,
     pub(crate) wall_s: f64,
     pub(crate) turns: u64,
+    pub(crate) restarts: u32,
     pub(crate) interrupted: bool,
 }
 
@@ -53,7 +74,7 @@ pub(crate) fn run(
     pace: &Pace,
     signals: &Signals,
     display: &mut dyn Display,
-) -> Result<Outcome, Box<dyn std::error::Error>> {
+) -> Result<Outcome, Failure> {
     let board = options.board.as_deref().unwrap_or(&graph.name);
     let mut graph = graph.clone();
     // Turns are handed around thousands of times a second. On one processor that costs a switch; across two, an interrupt.
@@ -64,10 +85,11 @@ pub(crate) fn run(
     let mut set = rustix::thread::CpuSet::new();
     set.set(cpu);
     rustix::thread::sched_setaffinity(None, &set)?;
+    let script = pace.script.as_ref().map(|script| Recording::open(&script.file)).transpose()?;
     let mut supervisor = Supervisor::new(&graph, board, options.logs.as_deref(), true)?;
     let observer = Tap::join(supervisor.host.place().clone(), "observer")
         .map_err(Into::into)
-        .and_then(|tap| Observer::new(tap, graph.finish.as_deref(), pace.record.as_deref()));
+        .and_then(|tap| Observer::new(tap, &graph, pace));
     let mut observer = match observer {
         Ok(observer) => observer,
         Err(error) => {
@@ -77,8 +99,9 @@ pub(crate) fn run(
     };
     supervisor.start_all();
     let outcome = wait_until_ready(&mut supervisor, signals)
-        .and_then(|()| Monitor::new(&supervisor, None).map_err(Into::into))
-        .and_then(|mut monitor| play(&mut supervisor, &mut monitor, &mut observer, pace, signals, display));
+        .and_then(|()| prompter(&supervisor, script.as_ref(), pace))
+        .and_then(|prompter| Stage::new(&graph, &mut supervisor, &mut observer, prompter, pace))
+        .and_then(|mut stage| stage.play(pace, signals, display));
     display.close();
     if let Err(error) = &outcome {
         let role = supervisor
@@ -91,17 +114,24 @@ pub(crate) fn run(
             supervisor.last_log_lines(&role, 12).iter().for_each(|line| eprintln!("  {line}"));
         }
     }
-    let recorded = observer.finish();
+    let recorded = observer.finish(outcome.as_ref().ok().map(|outcome| outcome.end));
     drop(observer);
     supervisor.stop(&|| signals.count() > 1)?;
     recorded?;
     outcome
 }
 
-fn wait_until_ready(
-    supervisor: &mut Supervisor,
-    signals: &Signals,
-) -> Result<(), Box<dyn std::error::Error>> {
+fn prompter<'a>(
+    supervisor: &Supervisor,
+    recording: Option<&'a Recording>,
+    pace: &Pace,
+) -> Result<Prompter<'a>, Failure> {
+    let (Some(recording), Some(script)) = (recording, &pace.script) else { return Ok(Prompter::default()) };
+    let tap = Tap::join(supervisor.host.place().clone(), "prompter")?;
+    Ok(Prompter::new(tap, recording, &script.topics, script.part)?)
+}
+
+fn wait_until_ready(supervisor: &mut Supervisor, signals: &Signals) -> Result<(), Failure> {
     while !supervisor.all_ready() {
         supervisor.tick();
         if let Some(failed) = supervisor.failed() {
@@ -117,84 +147,9 @@ fn wait_until_ready(
     Ok(())
 }
 
-fn play(
-    supervisor: &mut Supervisor,
-    monitor: &mut Monitor,
-    observer: &mut Observer,
-    pace: &Pace,
-    signals: &Signals,
-    display: &mut dyn Display,
-) -> Result<Outcome, Box<dyn std::error::Error>> {
-    let mut conductor = Conductor::new(&supervisor.host);
-    let began = clock::monotonic();
-    let mut next_glance = began.after(GLANCE);
-    let limit = pace.until_s.map_or(Time::from_nanos(u64::MAX), Time::from_secs_f64);
-    let mut interrupted = false;
-    while observer.verdict().is_none() && conductor.now() < limit {
-        let pids: Vec<(String, Option<u32>)> =
-            supervisor.services.iter().map(|service| (service.service.role.clone(), service.pid)).collect();
-        let mut lives = |role: &str| {
-            let pid = pids.iter().find(|(known, _)| known == role).and_then(|(_, pid)| *pid);
-            pid.is_some_and(board::switchboard::process_lives)
-        };
-        // Many instants for one glance: the glance looks at processes and the screen.
-        loop {
-            let mut seen = Ok(());
-            let mut look = |_, _| {
-                if seen.is_ok() {
-                    seen = observer.look();
-                }
-            };
-            let played = conductor.play_instant(&supervisor.host, &mut look, &mut lives);
-            seen?;
-            match played {
-                Ok(()) => {}
-                // Everything has been said: a run without a referee ends so.
-                Err(Discord::Over { .. })
-                    if supervisor.services.iter().any(|service| service.phase == Phase::Finished) =>
-                {
-                    return Ok(outcome(&conductor, observer, began, false));
-                }
-                Err(discord) => return Err(discord.into()),
-            }
-            if observer.verdict().is_some() || conductor.now() >= limit || clock::monotonic() >= next_glance {
-                break;
-            }
-            if let Some(speed) = pace.speed {
-                let ahead = conductor.now().as_secs_f64() / speed - clock::monotonic().seconds_since(began);
-                if ahead > 0.0 {
-                    clock::sleep(Duration::from_secs_f64(ahead.min(0.02)));
-                }
-            }
-        }
-        next_glance = clock::monotonic().after(GLANCE);
-        observer.tick(clock::monotonic())?;
-        supervisor.tick();
-        monitor.update(supervisor);
-        display.show(supervisor, monitor);
-        if signals.count() > 0 || display.wants_to_leave() {
-            interrupted = true;
-            break;
-        }
-    }
-    Ok(outcome(&conductor, observer, began, interrupted))
-}
-
-fn outcome(conductor: &Conductor, observer: &Observer, began: Time, interrupted: bool) -> Outcome {
-    Outcome {
-        verdict: observer.verdict(),
-        summary: observer.summary().copied(),
-        digest: observer.digest(),
-        logical_s: conductor.now().as_secs_f64(),
-        wall_s: clock::monotonic().seconds_since(began),
-        turns: conductor.turns,
-        interrupted,
-    }
-}
-
 /// `launch up --lockstep`, with its last lines.
 pub(crate) fn up(graph: &Checked, options: &Options, pace: &Pace, display: &mut dyn Display) -> ExitCode {
-    let run = || -> Result<Outcome, Box<dyn std::error::Error>> {
+    let run = || -> Result<Outcome, Failure> {
         for swept in board::host::sweep_named(options.board.as_deref())? {
             eprintln!("{}", summary::swept(&swept));
         }
@@ -216,13 +171,13 @@ pub(crate) fn up(graph: &Checked, options: &Options, pace: &Pace, display: &mut 
 }
 
 fn as_text(outcome: &Outcome) -> String {
-    let word = outcome.summary.as_ref().map(|word| summary::text(word, 0)).unwrap_or_default();
+    let word = outcome.summary.as_ref().map(|word| summary::text(word, outcome.restarts)).unwrap_or_default();
     let interrupted = if outcome.interrupted { "interrupted after " } else { "" };
     format!(
         "{word}{interrupted}{:.3} s of logical time in {:.3} s: {:.0} x real time, {} turns\ndigest {} ({} messages)\n",
-        outcome.logical_s,
+        outcome.end.as_secs_f64(),
         outcome.wall_s,
-        outcome.logical_s / outcome.wall_s.max(1e-9),
+        outcome.end.as_secs_f64() / outcome.wall_s.max(1e-9),
         outcome.turns,
         outcome.digest.digest,
         outcome.digest.messages,
@@ -230,12 +185,15 @@ fn as_text(outcome: &Outcome) -> String {
 }
 
 fn as_json(outcome: &Outcome) -> String {
-    let run =
-        outcome.summary.as_ref().map(|word| summary::json(word, 0)).unwrap_or_else(|| "null".to_owned());
+    let run = outcome
+        .summary
+        .as_ref()
+        .map(|word| summary::json(word, outcome.restarts))
+        .unwrap_or_else(|| "null".to_owned());
     let run: serde_json::Value = serde_json::from_str(&run).unwrap_or_default();
     let value = serde_json::json!({
         "run": run,
-        "logical_s": outcome.logical_s,
+        "logical_s": outcome.end.as_secs_f64(),
         "wall_s": outcome.wall_s,
         "turns": outcome.turns,
         "digest": outcome.digest,

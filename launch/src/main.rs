@@ -1,5 +1,6 @@
 //! The launcher: checks, starts, watches, swaps and stops the services of a robot.
 
+mod chaos;
 mod cli;
 mod commands;
 mod compare;
@@ -7,13 +8,22 @@ mod conductor;
 mod control;
 mod detach;
 mod experiment;
+mod faults;
 mod graph;
 mod lockstep;
 mod monitor;
+mod new;
+mod notes;
 mod observer;
 mod plain;
+mod play;
+mod prompter;
+mod rerun;
+mod shadow;
+mod steering;
 mod summary;
 mod supervise;
+mod swap;
 mod up;
 mod view;
 
@@ -30,7 +40,10 @@ fn main() -> ExitCode {
         Command::Top(args) => commands::finish(commands::top(&args)),
         Command::Logs(args) => commands::finish(commands::logs(&args)),
         Command::Restart(args) => commands::finish(commands::restart(&args)),
+        Command::Swap(args) => commands::finish(swap::command(&args)),
         Command::Stop(args) => commands::finish(commands::stop(&args)),
+        Command::Chaos(args) => chaos::command(&args),
+        Command::New(args) => commands::finish(new::command(&args)),
         Command::Experiment(args) => experiment::command(&args),
         Command::Graph(args) => graph::graph_command(&args.which.request(None), args.dot),
         Command::Order(args) => commands::finish(commands::order(&args)),
@@ -39,6 +52,7 @@ fn main() -> ExitCode {
             Ok(code) => code,
             Err(error) => commands::finish(Err(error)),
         },
+        Command::Rerun(args) => rerun::command(&args),
         Command::Completions { shell } => {
             cli::print_completions(shell);
             ExitCode::SUCCESS
@@ -63,11 +77,16 @@ fn up_command(args: &UpArgs) -> ExitCode {
     if args.lockstep {
         let pace = lockstep::Pace {
             speed: args.speed,
-            until_s: args.until,
+            until: args.until.map(messages::Time::from_secs_f64),
             cpu: args.cpu,
             record: args.record.clone(),
+            steered: args.steered,
+            ..lockstep::Pace::default()
         };
         return lockstep::up(&graph, &options, &pace, &mut lines);
+    }
+    if !graph.faults.is_empty() {
+        eprintln!("the faults of the graph happen in logical time only: with --lockstep");
     }
     let on_terminal = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
     if on_terminal && !args.plain && !args.no_view {

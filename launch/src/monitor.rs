@@ -75,7 +75,7 @@ impl Monitor {
         let passed_s = self.sampled.map_or(0.0, |last| now.seconds_since(last));
         self.sampled = Some(now);
         for service in &supervisor.services {
-            let (Some(pid), Some(slot)) = (service.pid, service.slot) else { continue };
+            let (Some(pid), Some(slot)) = (service.pid(), service.slot()) else { continue };
             let Some(slot) = supervisor.host.switchboard().slot(slot) else { continue };
             let steps = slot.steps.load(Ordering::Relaxed);
             let cpu_s = cpu_seconds(pid);
@@ -99,7 +99,7 @@ impl Monitor {
                 role: role.clone(),
                 run: service.service.run.clone(),
                 state: control::phase_name(service.phase).to_owned(),
-                pid: service.pid,
+                pid: service.pid(),
                 restarts: service.restarts,
                 rate_hz: sample.rate_hz,
                 cpu_percent: sample.cpu_percent,
@@ -110,13 +110,15 @@ impl Monitor {
                 late_steps: health.late_steps,
                 lost_messages: health.lost_messages,
                 invalid_messages: health.invalid_messages,
+                swap: service.swap_state().cloned(),
             }
         });
         Status {
             board: supervisor.host.place().name().to_owned(),
-            graph: graph.display().to_string(),
+            graph: std::path::absolute(graph).unwrap_or_else(|_| graph.to_owned()).display().to_string(),
             launcher_pid: std::process::id(),
             uptime_s: clock::monotonic().seconds_since(supervisor.began),
+            overrides: supervisor.overrides.clone(),
             logs: supervisor
                 .log_file("x")
                 .parent()

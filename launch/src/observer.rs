@@ -1,11 +1,14 @@
 //! Every message of a run in logical time, seen once: for the digest, the recording, and the referee's word.
 
+use crate::graph::Checked;
+use crate::lockstep::Pace;
+use crate::notes;
 use board::JoinError;
 use board::manifest::Manifest;
-use board::tap::{Tap, TapReader};
+use board::tap::{OUTSIDE_ROUND, Tap, TapReader};
 use messages::{RunState, RunSummary, Time, View};
 use recording::{Digest, Digester, Envelope, Recorder};
-use std::path::Path;
+use std::collections::BTreeMap;
 
 /// Reads every topic after every round.
 pub(crate) struct Observer {
@@ -13,6 +16,8 @@ pub(crate) struct Observer {
     digester: Digester,
     recorder: Option<Recorder>,
     finish: Option<String>,
+    /// Topics on which something came from outside.
+    outside: Vec<bool>,
     summary: Option<RunSummary>,
     /// Kept until the end: dropping it gives the place on the board back.
     _tap: Tap,
@@ -39,15 +44,17 @@ impl Observer {
     ///
     /// # Errors
     /// When the board takes no more readers, or the file cannot be written.
-    pub(crate) fn new(tap: Tap, finish: Option<&str>, file: Option<&Path>) -> Result<Self, ObserverError> {
-        let contents = of_a_run(tap.manifest());
+    pub(crate) fn new(tap: Tap, graph: &Checked, pace: &Pace) -> Result<Self, ObserverError> {
+        let notes = if pace.record.is_some() { notes::of_graph(graph) } else { BTreeMap::new() };
+        let contents = of_a_run(tap.manifest(), notes.into_iter().chain(pace.notes.clone()).collect());
         let mut readers = Vec::with_capacity(contents.topics.len());
         for topic in &contents.topics {
             readers.push(Watched { topic: topic.name.clone(), reader: tap.reader(&topic.name)? });
         }
         let digester = Digester::new(contents.topics.iter().map(|topic| topic.name.as_str()));
-        let recorder = file.map(|file| Recorder::new(file, &contents)).transpose()?;
-        Ok(Self { readers, digester, recorder, finish: finish.map(str::to_owned), summary: None, _tap: tap })
+        let recorder = pace.record.as_deref().map(|file| Recorder::new(file, &contents)).transpose()?;
+        let (outside, finish) = (vec![false; readers.len()], graph.finish.clone());
+        Ok(Self { readers, digester, recorder, finish, outside, summary: None, _tap: tap })
     }
 
     /// Takes in what this round has brought.
@@ -65,6 +72,7 @@ impl Observer {
                     round: envelope.round,
                 };
                 self.digester.add(index, &envelope, bytes);
+                self.outside[index] |= envelope.round == OUTSIDE_ROUND;
                 if let Some(recorder) = &mut self.recorder {
                     recorder.record(index, &envelope, bytes)?;
                 }
@@ -85,12 +93,23 @@ impl Observer {
         self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.tick(host_time))
     }
 
-    /// Ends the recording.
+    /// Brings the recording up to date.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub(crate) fn finish(&mut self) -> Result<(), recording::RecordingError> {
-        self.recorder.take().map_or(Ok(()), |recorder| recorder.finish().map(|_| ()))
+    pub(crate) fn flush(&mut self) -> Result<(), recording::RecordingError> {
+        self.recorder.as_mut().map_or(Ok(()), Recorder::flush)
+    }
+
+    /// Ends the recording; `end` is the run's last instant if it ended in order.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub(crate) fn finish(&mut self, end: Option<Time>) -> Result<(), recording::RecordingError> {
+        let Some(mut recorder) = self.recorder.take() else { return Ok(()) };
+        let topics = self.readers.iter().zip(&self.outside).filter(|(_, outside)| **outside);
+        notes::at_end(&mut recorder, end, topics.map(|(watched, _)| watched.topic.as_str()));
+        recorder.finish().map(|_| ())
     }
 
     /// The referee's last word.
@@ -111,7 +130,7 @@ impl Observer {
 }
 
 /// The topics of a run as a recording lists them.
-fn of_a_run(manifest: &Manifest) -> recording::Manifest {
+fn of_a_run(manifest: &Manifest, notes: BTreeMap<String, String>) -> recording::Manifest {
     let topics = manifest.topics.iter().filter(|topic| !topic.name.starts_with("health/"));
     recording::Manifest {
         graph: manifest.graph.clone(),
@@ -124,6 +143,6 @@ fn of_a_run(manifest: &Manifest) -> recording::Manifest {
                 message: topic.message.clone(),
             })
             .collect(),
-        notes: std::collections::BTreeMap::new(),
+        notes,
     }
 }

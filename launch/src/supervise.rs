@@ -1,33 +1,34 @@
 //! Starts the services, sees at once when one dies or hangs, cleans up after it, and starts it again.
 
-use crate::graph::Priority;
-use crate::graph::{Checked, CheckedService, Publisher};
+mod cleaner;
+mod process;
+mod swap;
+
+use crate::graph::{Checked, CheckedService, CheckedTopic, Overrides};
 use board::host::{self, Host, HostError};
 use board::manifest::{Manifest, Topic};
 use board::switchboard::SlotState;
 use board::{EXIT_SETUP, clock};
+use cleaner::Cleaner;
 use messages::{Health, Message as _, Time};
+use process::{Process, Surroundings, death};
 use rustix::event::{PollFd, PollFlags, poll};
-use rustix::process::{Pid, PidfdFlags, Signal, kill_process, pidfd_open};
+use rustix::process::Signal;
 use std::collections::VecDeque;
-use std::fs::{File, OpenOptions};
 use std::io;
 use std::os::fd::{AsFd as _, OwnedFd};
-use std::os::unix::fs::OpenOptionsExt as _;
-use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
+use swap::{Newcomer, Predecessor};
+pub(crate) use swap::{SwapRequest, SwapState};
 
 /// Whoever publishes this drives the wheels, and leaves first when the robot is stopped.
 const WHEELS: &str = "wheels/applied";
 /// How long a service may take to join the board.
 const START_LIMIT: Duration = Duration::from_secs(10);
 /// A service that ran for so long was sound: its next restart is immediate again.
-const SOUND_AFTER: Duration = Duration::from_secs(1);
-/// How long the helper may take that cleans up after the dead.
-const CLEAN_LIMIT: Duration = Duration::from_secs(3);
+const SOUND_AFTER: Duration = Duration::from_millis(500);
 const EVENTS_KEPT: usize = 200;
 
 /// Something that the operator wants to know.
@@ -66,21 +67,44 @@ pub(crate) struct Supervised {
     pub(crate) phase: Phase,
     /// Starts after the first.
     pub(crate) restarts: u32,
-    pub(crate) slot: Option<u32>,
-    pub(crate) pid: Option<u32>,
     process: Option<Process>,
+    /// A process beside it: one that is to take its place, or a shadow.
+    newcomer: Option<Newcomer>,
+    /// What it was before each swap, so that it can be had back.
+    predecessors: Vec<Predecessor>,
+    /// How its last swap stands.
+    swap: Option<SwapState>,
     /// Deaths in a row, without a sound run between them.
     failures: u32,
     restart_at: Option<Time>,
     died_at: Option<Time>,
 }
 
-#[derive(Debug)]
-struct Process {
-    child: Child,
-    pidfd: OwnedFd,
-    started: Time,
-    ready: Option<Time>,
+impl Supervised {
+    fn of(service: CheckedService) -> Self {
+        Self {
+            service,
+            phase: Phase::Waiting,
+            restarts: 0,
+            process: None,
+            newcomer: None,
+            predecessors: Vec::new(),
+            swap: None,
+            failures: 0,
+            restart_at: None,
+            died_at: None,
+        }
+    }
+
+    /// The number of its process, while it lives.
+    pub(crate) fn pid(&self) -> Option<u32> {
+        self.process.as_ref().map(Process::pid)
+    }
+
+    /// Its place on the board, while it lives.
+    pub(crate) fn slot(&self) -> Option<u32> {
+        self.process.as_ref().map(|process| process.slot)
+    }
 }
 
 /// The set of services on one board.
@@ -91,10 +115,13 @@ pub(crate) struct Supervisor {
     /// Events so far, so that a reader knows which are new.
     pub(crate) event_count: usize,
     pub(crate) began: Time,
+    /// What differs from the graph's file: by the command line, and by swaps since.
+    pub(crate) overrides: Overrides,
     folder: PathBuf,
     logs: PathBuf,
-    cleaner: Option<(Child, Time)>,
-    clean_again: bool,
+    /// Processes that were swapped out and are on their way, with the moment at which they are ended.
+    leaving: Vec<(Process, Time)>,
+    cleaner: Cleaner,
     last_tick: Time,
 }
 
@@ -109,28 +136,18 @@ impl Supervisor {
         let host = Host::create(board, manifest_of(graph), lockstep)?;
         let logs = logs.map_or_else(|| host.place().file("logs"), Path::to_owned);
         std::fs::create_dir_all(&logs)?;
-        let supervised = |service: &CheckedService| Supervised {
-            service: service.clone(),
-            phase: Phase::Waiting,
-            restarts: 0,
-            slot: None,
-            pid: None,
-            process: None,
-            failures: 0,
-            restart_at: None,
-            died_at: None,
-        };
         let now = clock::monotonic();
         Ok(Self {
             host,
-            services: graph.services.iter().map(supervised).collect(),
+            services: graph.services.iter().cloned().map(Supervised::of).collect(),
             events: VecDeque::new(),
             event_count: 0,
             began: now,
+            overrides: graph.overrides.clone(),
             folder: graph.folder.clone(),
             logs,
-            cleaner: None,
-            clean_again: false,
+            leaving: Vec::new(),
+            cleaner: Cleaner::default(),
             last_tick: now,
         })
     }
@@ -159,18 +176,21 @@ impl Supervisor {
             if !held_up {
                 self.end_if_hanging(index, now);
             }
+            self.tend_newcomer(index, now);
             if self.services[index].restart_at.is_some_and(|at| at <= now) {
                 self.services[index].restart_at = None;
                 self.services[index].restarts += 1;
                 self.start(index);
             }
         }
+        self.see_off(now);
         self.tend_cleaner(now);
     }
 
     /// When `tick` is due at the latest.
     pub(crate) fn next_due(&self, now: Time) -> Duration {
-        let starting = self.services.iter().any(|service| service.phase == Phase::Starting);
+        let starting =
+            self.services.iter().any(|service| service.phase == Phase::Starting || service.awaits_newcomer());
         let most = if starting { Duration::from_millis(3) } else { Duration::from_millis(100) };
         let restarts = self.services.iter().filter_map(|service| service.restart_at);
         restarts.map(|at| at.since(now)).fold(most, Duration::min)
@@ -178,7 +198,10 @@ impl Supervisor {
 
     /// Descriptors that become readable when a service dies.
     pub(crate) fn descriptors(&self) -> impl Iterator<Item = &OwnedFd> {
-        self.services.iter().filter_map(|service| service.process.as_ref().map(|process| &process.pidfd))
+        let services = self.services.iter().filter_map(|service| service.process.as_ref());
+        let newcomers = self.services.iter().filter_map(Supervised::newcomer_process);
+        let leaving = self.leaving.iter().map(|(process, _)| process);
+        services.chain(newcomers).chain(leaving).map(|process| &process.pidfd)
     }
 
     /// Whether every service has joined the board.
@@ -205,12 +228,59 @@ impl Supervisor {
         let service = &mut self.services[index];
         service.failures = 0;
         match &service.process {
-            Some(process) => signal(process, Signal::TERM),
+            Some(process) => process.ask_to_leave(),
             None => service.restart_at = Some(clock::monotonic()),
         }
         // A process that leaves when asked ends without an error; it is to come back all the same.
         service.phase = if service.process.is_some() { Phase::Waiting } else { service.phase };
         true
+    }
+
+    /// Kills a service, waits for its end and cleans up after it: for logical time, which stands still meanwhile.
+    pub(crate) fn end_at_once(&mut self, role: &str) {
+        let Some(service) = self.services.iter_mut().find(|service| service.service.role == role) else {
+            return;
+        };
+        service.phase = Phase::Waiting;
+        if let Some(mut process) = service.process.take() {
+            process.signal(Signal::KILL);
+            process.wait();
+            self.host.switchboard().release(process.slot);
+        }
+        self.clean();
+        while self.cleaner.is_busy() {
+            clock::sleep(Duration::from_millis(1));
+            self.tend_cleaner(clock::monotonic());
+        }
+    }
+
+    /// Starts a service again that was ended so, and waits until it has joined and has the last message of every topic that it reads.
+    ///
+    /// # Errors
+    /// When it does not join.
+    pub(crate) fn begin_again(&mut self, role: &str) -> Result<(), String> {
+        let Some(index) = self.services.iter().position(|service| service.service.role == role) else {
+            return Ok(());
+        };
+        self.services[index].restarts += 1;
+        self.start(index);
+        let deadline = clock::monotonic().after(START_LIMIT);
+        while self.services[index].phase != Phase::Running || !self.have_served() {
+            self.tick();
+            if self.services[index].phase == Phase::Failed || clock::monotonic() > deadline {
+                return Err(format!("`{role}` does not come back"));
+            }
+            clock::sleep(Duration::from_micros(200));
+        }
+        Ok(())
+    }
+
+    /// Whether every service has given the readers that have joined its last message.
+    fn have_served(&self) -> bool {
+        let board = self.host.switchboard();
+        let topology = board.header().topology.load(Ordering::Acquire);
+        let slots = self.services.iter().filter_map(|service| board.slot(service.slot()?));
+        slots.into_iter().all(|slot| slot.served.load(Ordering::Acquire) == topology)
     }
 
     /// Notes an event.
@@ -236,15 +306,19 @@ impl Supervisor {
     /// # Errors
     /// When something of the board cannot be removed.
     pub(crate) fn stop(mut self, hurry: &dyn Fn() -> bool) -> io::Result<()> {
-        if let Some((mut cleaner, _)) = self.cleaner.take() {
-            let _ = cleaner.kill();
-            let _ = cleaner.wait();
+        self.cleaner.stop();
+        for index in 0..self.services.len() {
+            self.dismiss(index);
         }
         let driver = self.host.manifest().topic(WHEELS).and_then(|(_, topic)| topic.publisher.clone());
         let (first, rest): (Vec<usize>, Vec<usize>) = (0..self.services.len())
             .partition(|&index| Some(&self.services[index].service.role) == driver.as_ref());
         self.end(&first, hurry);
         self.end(&rest, hurry);
+        for (process, _) in &mut self.leaving {
+            process.signal(Signal::KILL);
+            process.wait();
+        }
         self.host.take_down()
     }
 
@@ -252,9 +326,7 @@ impl Supervisor {
         let asked = clock::monotonic();
         for &index in group {
             if let Some(process) = &self.services[index].process {
-                // One that was stopped cannot hear.
-                signal(process, Signal::CONT);
-                signal(process, Signal::TERM);
+                process.ask_to_leave();
             }
         }
         loop {
@@ -263,14 +335,14 @@ impl Supervisor {
             for &index in group {
                 let service = &mut self.services[index];
                 let Some(process) = &mut service.process else { continue };
-                if matches!(process.child.try_wait(), Ok(Some(_))) {
+                if process.ended().is_some() {
                     service.process = None;
                     continue;
                 }
                 let limit =
                     if hurry() { Duration::from_millis(50) } else { service.service.launch.stop_after };
                 if now.since(asked) > limit {
-                    let _ = process.child.kill();
+                    process.signal(Signal::KILL);
                 }
                 waiting.push(index);
             }
@@ -290,7 +362,10 @@ impl Supervisor {
     fn start(&mut self, index: usize) {
         let role = self.services[index].service.role.clone();
         match self.spawn(index) {
-            Ok(()) => {}
+            Ok(process) => {
+                self.services[index].process = Some(process);
+                self.services[index].phase = Phase::Starting;
+            }
             Err(error) => {
                 self.services[index].phase = Phase::Failed;
                 self.note(&role, format!("cannot be started: {error}"), true);
@@ -298,64 +373,25 @@ impl Supervisor {
         }
     }
 
-    fn spawn(&mut self, index: usize) -> io::Result<()> {
+    fn spawn(&self, index: usize) -> io::Result<Process> {
         let service = &self.services[index].service;
         let slot = self
             .host
             .prepare(&service.role, true)
             .ok_or_else(|| io::Error::other("the board has no place left"))?;
-        let log = open_log(&self.log_file(&service.role))?;
-        let mut command = Command::new(&service.binary);
-        command
-            .args(["--board", self.host.place().name(), "--role", &service.role])
-            .args(["--slot", &slot.to_string()])
-            .args(["--params", &service.parameters.to_string()])
-            .env("RUST_LOG", &service.launch.log)
-            .current_dir(&self.folder)
-            .stdin(Stdio::null())
-            .stdout(log.try_clone()?)
-            .stderr(log)
-            // Ctrl-C is for the launcher alone, which stops the robot before the services.
-            .process_group(0);
-        for processor in &service.launch.cpu {
-            command.args(["--cpu", &processor.to_string()]);
-        }
-        match service.launch.priority {
-            Priority::Normal => {}
-            Priority::Fifo(priority) => _ = command.args(["--fifo", &priority.to_string()]),
-            Priority::Nice(nice) => _ = command.args(["--nice", &nice.to_string()]),
-        }
-        let spawned = command.spawn().and_then(|child| {
-            let pid = Pid::from_child(&child);
-            Ok((pidfd_open(pid, PidfdFlags::empty())?, child))
-        });
-        let (pidfd, child) = match spawned {
-            Ok(spawned) => spawned,
-            Err(error) => {
-                self.host.switchboard().release(slot);
-                return Err(error);
-            }
-        };
-        let pid = child.id();
-        if let Some(entry) = self.host.switchboard().slot(slot) {
-            entry.pid.store(pid, Ordering::Release);
-        }
-        let service = &mut self.services[index];
-        service.process = Some(Process { child, pidfd, started: clock::monotonic(), ready: None });
-        service.slot = Some(slot);
-        service.pid = Some(pid);
-        service.phase = Phase::Starting;
-        Ok(())
+        let log = self.log_file(&service.role);
+        Process::spawn(self.surroundings(&log), service, slot, false)
+    }
+
+    fn surroundings<'a>(&'a self, log: &'a Path) -> Surroundings<'a> {
+        Surroundings { host: &self.host, folder: &self.folder, log }
     }
 
     fn note_ready(&mut self, index: usize, now: Time) {
-        let Some(slot) = self.services[index].slot.and_then(|slot| self.host.switchboard().slot(slot)) else {
-            return;
-        };
-        let joined = slot.state() == SlotState::Running;
         let service = &mut self.services[index];
         let Some(process) = &mut service.process else { return };
-        if !joined || process.ready.is_some() {
+        let slot = self.host.switchboard().slot(process.slot);
+        if process.ready.is_some() || slot.is_none_or(|slot| slot.state() != SlotState::Running) {
             return;
         }
         process.ready = Some(now);
@@ -375,14 +411,15 @@ impl Supervisor {
     fn reap(&mut self, index: usize, now: Time) {
         let service = &mut self.services[index];
         let Some(process) = &mut service.process else { return };
-        let Ok(Some(status)) = process.child.try_wait() else { return };
+        let Some(status) = process.ended() else { return };
         let was_sound = process.ready.is_some_and(|ready| now.since(ready) >= SOUND_AFTER);
         let role = service.service.role.clone();
+        self.host.switchboard().release(process.slot);
         service.process = None;
-        service.pid = None;
-        if let Some(slot) = service.slot.take() {
-            self.host.switchboard().release(slot);
+        if self.stands_in(index, status, now) {
+            return;
         }
+        let service = &mut self.services[index];
         if status.success() && service.phase == Phase::Waiting {
             service.restart_at = Some(now);
             service.died_at = Some(now);
@@ -395,19 +432,15 @@ impl Supervisor {
         }
         service.failures = if was_sound { 1 } else { service.failures + 1 };
         let failures = service.failures;
-        let policy = service.service.launch.restart;
+        // In logical time a death that nobody planned ends the run.
+        let lockstep = self.host.switchboard().header().lockstep.load(Ordering::Relaxed) != 0;
+        let policy = service.service.launch.restart.filter(|_| !lockstep);
         let setup = status.code() == Some(i32::from(EXIT_SETUP));
         let how = death(status);
         let next = match policy {
             None => Err("it is not to be restarted".to_owned()),
             Some(_) if setup => Err("its set-up is wrong".to_owned()),
-            Some(policy) if failures > policy.give_up_after => Err(format!("{failures} deaths in a row")),
-            // The first restart is immediate.
-            Some(_) if failures <= 1 => Ok(Duration::ZERO),
-            Some(policy) => {
-                let doublings = (failures - 2).min(20);
-                Ok((policy.backoff_min * 2_u32.pow(doublings)).min(policy.backoff_max))
-            }
+            Some(policy) => policy.pause_after(failures).ok_or_else(|| format!("{failures} deaths in a row")),
         };
         service.died_at.get_or_insert(now);
         match next {
@@ -432,8 +465,8 @@ impl Supervisor {
 
     fn end_if_hanging(&mut self, index: usize, now: Time) {
         let service = &self.services[index];
-        let (Some(process), Some(slot)) = (&service.process, service.slot) else { return };
-        let Some(slot) = self.host.switchboard().slot(slot) else { return };
+        let Some(process) = &service.process else { return };
+        let Some(slot) = self.host.switchboard().slot(process.slot) else { return };
         let limit = service.service.launch.hang_after;
         let lockstep = self.host.switchboard().header().lockstep.load(Ordering::Relaxed) != 0;
         let silence = match process.ready {
@@ -447,96 +480,53 @@ impl Supervisor {
         }
         let what = if process.ready.is_none() { "did not join the board" } else { "hangs" };
         let text = format!("{what}: silent for {:.1} s; ending it", silence.as_secs_f64());
-        signal(process, Signal::KILL);
+        process.signal(Signal::KILL);
         let role = service.service.role.clone();
         self.note(&role, text, true);
     }
 
-    /// Cleans up after the dead, in a helper process, since it can hang.
-    fn clean(&mut self) {
-        if self.cleaner.is_some() {
-            self.clean_again = true;
-            return;
-        }
-        self.clean_again = false;
-        let helper = std::env::current_exe().and_then(|launcher| {
-            Command::new(launcher)
-                .args(["clean-dead", self.host.place().name()])
-                .stdin(Stdio::null())
-                .stdout(Stdio::null())
-                .stderr(Stdio::null())
-                .process_group(0)
-                .spawn()
-        });
-        match helper {
-            Ok(child) => self.cleaner = Some((child, clock::monotonic())),
-            Err(error) => self.note("", format!("nothing cleans up after the dead: {error}"), true),
-        }
-    }
-
     fn tend_cleaner(&mut self, now: Time) {
-        let Some((cleaner, since)) = &mut self.cleaner else { return };
-        match cleaner.try_wait() {
-            Ok(None) if now.since(*since) < CLEAN_LIMIT => return,
-            Ok(None) => {
-                let _ = cleaner.kill();
-                let _ = cleaner.wait();
-                self.note("", "cleaning up after the dead took too long and was broken off", true);
-            }
-            _ => {}
-        }
-        self.cleaner = None;
-        if self.clean_again {
-            self.clean();
+        if let Err(error) = self.cleaner.tend(self.host.place().name(), now) {
+            self.note("", format!("cleaning up after the dead: {error}"), true);
         }
     }
-}
 
-fn signal(process: &Process, signal: Signal) {
-    let _ = kill_process(Pid::from_child(&process.child), signal);
-}
-
-fn death(status: ExitStatus) -> String {
-    match (status.signal(), status.code()) {
-        (Some(9), _) => "was killed (signal 9)".to_owned(),
-        (Some(11), _) => "crashed (signal 11)".to_owned(),
-        (Some(number), _) => format!("was ended by signal {number}"),
-        (None, Some(101)) => "panicked".to_owned(),
-        (None, code) => format!("ended with code {}", code.unwrap_or(-1)),
+    /// Cleans up after the dead.
+    fn clean(&mut self) {
+        if let Err(error) = self.cleaner.clean(self.host.place().name()) {
+            self.note("", format!("nothing cleans up after the dead: {error}"), true);
+        }
     }
-}
-
-fn open_log(path: &Path) -> io::Result<File> {
-    OpenOptions::new().create(true).append(true).mode(0o600).open(path)
 }
 
 fn manifest_of(graph: &Checked) -> Manifest {
-    let mut topics: Vec<Topic> = graph
-        .topics
-        .iter()
-        .map(|topic| Topic {
-            name: topic.name.clone(),
-            publisher: match &topic.publisher {
-                Publisher::Service(role) => Some(role.clone()),
-                Publisher::External | Publisher::Nobody => None,
-            },
-            readers: topic.readers.iter().map(|reader| reader.role.clone()).collect(),
-            depth: topic.depth,
-            message: topic.message.clone(),
-        })
-        .collect();
-    topics.extend(graph.services.iter().map(|service| Topic {
-        name: host::health_topic(&service.role),
-        publisher: Some(service.role.clone()),
-        readers: Vec::new(),
-        depth: 4,
-        message: Health::description(),
-    }));
+    let mut topics: Vec<Topic> = graph.topics.iter().map(topic_of).collect();
+    topics.extend(graph.services.iter().map(|service| health_of(&service.role)));
     Manifest {
         graph: graph.file.display().to_string(),
         seed: graph.seed,
         topics,
         services: graph.services.iter().map(|service| service.role.clone()).collect(),
         launcher_pid: 0,
+    }
+}
+
+fn topic_of(topic: &CheckedTopic) -> Topic {
+    Topic {
+        name: topic.name.clone(),
+        publisher: topic.publisher.role().map(str::to_owned),
+        readers: topic.readers.iter().map(|reader| reader.role.clone()).collect(),
+        depth: topic.depth,
+        message: topic.message.clone(),
+    }
+}
+
+fn health_of(role: &str) -> Topic {
+    Topic {
+        name: host::health_topic(role),
+        publisher: Some(role.to_owned()),
+        readers: Vec::new(),
+        depth: 4,
+        message: Health::description(),
     }
 }

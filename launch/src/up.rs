@@ -174,11 +174,17 @@ fn answer(
                 supervisor.services.iter().map(|service| service.service.role.as_str()).collect();
             Answer::Refused(format!("there is no service `{role}`; there are {}", known.join(", ")))
         }
+        Request::Swap(request) => done(supervisor.swap(*request)),
+        Request::SwapBack { role } => done(supervisor.swap_back(&role)),
         Request::Stop { .. } => {
             *asked = true;
             Answer::Done
         }
     }
+}
+
+fn done(result: Result<(), String>) -> Answer {
+    result.map_or_else(Answer::Refused, |()| Answer::Done)
 }
 
 /// INT, TERM and HUP as a readable descriptor and a count.

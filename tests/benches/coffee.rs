@@ -33,14 +33,14 @@ fn main() {
 /// As the launcher says: from the beginning of `up`, after the check, to the last service's first look at the board; and the whole command before it.
 fn time_to_ready_ms() -> f64 {
     let began = clock::monotonic();
-    let graph = Graph::load("coffee").set("navigator.default_order", "").start();
+    let graph = Graph::load("coffee").set("navigator.default_order", "").without_recording().start();
     let took_ms = clock::monotonic().seconds_since(began) * 1e3;
     graph.stop();
     took_ms
 }
 
 fn idle() {
-    let graph = Graph::load("coffee").set("navigator.default_order", "").start();
+    let graph = Graph::load("coffee").set("navigator.default_order", "").without_recording().start();
     clock::sleep(Duration::from_secs(2));
     let launcher_pid = graph.launcher_pid();
     let pids: Vec<u32> = graph.services().into_iter().map(|(_, pid)| pid).chain([launcher_pid]).collect();

@@ -39,7 +39,7 @@ pub fn build() -> &'static PathBuf {
 }
 
 /// This test lies in `<target>/<profile>/deps`.
-fn target_folder() -> PathBuf {
+pub(crate) fn target_folder() -> PathBuf {
     let test = std::env::current_exe().unwrap_or_default();
     test.ancestors().nth(3).map(PathBuf::from).unwrap_or_default()
 }

@@ -9,6 +9,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 pub struct Graph {
     file: PathBuf,
     arguments: Vec<String>,
+    in_lockstep: bool,
+    is_recorded: bool,
 }
 
 impl Graph {
@@ -20,7 +22,7 @@ impl Graph {
             PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../launch/graphs"))
                 .join(format!("{graph}.toml"))
         };
-        Self { file, arguments: Vec::new() }
+        Self { file, arguments: Vec::new(), in_lockstep: false, is_recorded: true }
     }
 
     /// Sets a parameter: `role.parameter`.
@@ -45,18 +47,29 @@ impl Graph {
         self.with(&["--seed", &seed.to_string()])
     }
 
+    /// Runs it in logical time with this seed. The graph then stands still but for [`Running::advance`] and [`Running::wait_for`]: the same test
+    /// sees the same messages in every run, however busy the machine is.
+    pub fn lockstep(self, seed: u64) -> Self {
+        Self { in_lockstep: true, ..self.seed(seed) }
+    }
+
+    /// Keeps no recording for the case that the test fails: for measurements.
+    pub fn without_recording(self) -> Self {
+        Self { is_recorded: false, ..self }
+    }
+
     /// Further arguments for `launch up`.
     pub fn with(mut self, arguments: &[&str]) -> Self {
         self.arguments.extend(arguments.iter().map(|argument| (*argument).to_owned()));
         self
     }
 
-    /// Starts it on a board of its own and waits until every service is ready.
+    /// Starts it on a board of its own and waits until every service is ready; in logical time also until the first instant is over.
     ///
     /// # Panics
     /// When it does not start, with the launcher's words.
     pub fn start(self) -> Running {
-        Running::start(&self.file, &Self::board_name(), &self.arguments)
+        Running::start(&self)
     }
 
     /// A board that no other test has.
@@ -71,5 +84,13 @@ impl Graph {
 
     pub(crate) fn arguments(&self) -> &[String] {
         &self.arguments
+    }
+
+    pub(crate) fn is_in_lockstep(&self) -> bool {
+        self.in_lockstep
+    }
+
+    pub(crate) fn is_recorded(&self) -> bool {
+        self.is_recorded
     }
 }

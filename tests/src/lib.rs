@@ -1,5 +1,8 @@
 //! The harness for process graphs: start a graph on a board of its own, talk to it, wait for what it does, kill its services, and leave nothing
-//! behind.
+//! behind, also when the test panics.
+//!
+//! A graph runs in host time, or in logical time with [`Graph::lockstep`]; the same words drive both. A test that fails prints the last messages and log
+//! lines of each service, and keeps the recording of the graph in `target/tmp/failed-graphs`.
 //!
 //! ```no_run
 //! use tests::Graph;
@@ -12,10 +15,14 @@
 //! ```
 
 mod binaries;
+mod failure;
 mod graph;
+mod keeper;
 mod logical;
 mod running;
+mod steering;
 
 pub use binaries::{build, launcher};
 pub use graph::Graph;
+pub use keeper::folder as failed_graphs;
 pub use running::{Running, signal};

@@ -213,3 +213,11 @@ fn the_top_level_is_the_agreed_one() {
         assert!(name.starts_with('.') || allowed.contains(&name.as_str()), "{name} at the top level");
     }
 }
+
+#[test]
+fn the_test_in_the_readme_is_one_that_runs() {
+    let readme = fs::read_to_string(root().join("README.md")).unwrap();
+    let test = include_str!("first.rs");
+    assert!(readme.contains(&format!("```rust\n{test}```")), "the README shows another test than first.rs");
+    assert!(test.lines().count() <= 25, "a first test is short");
+}

@@ -1,6 +1,6 @@
 //! Whether two runs were the same: a digest for yes or no, and the first difference for where.
 
-use crate::{Envelope, Message, Recording, RecordingError};
+use crate::{Envelope, Message, Recording, RecordingError, Topic};
 use blake3::Hasher;
 use messages::{Description, Kind, elements_offset};
 use serde::Serialize;
@@ -121,18 +121,9 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
     let ranks = |recording: &Recording| recording.topics().iter().map(|topic| rank(&topic.name)).collect();
     for topic in a.topics() {
         if let Some((_, other)) = b.manifest().topic(&topic.name).filter(|_| rank(&topic.name).is_some())
-            && let Some(words) = topic.message.first_difference(&other.message)
+            && let Some(difference) = layout_difference(topic, other)
         {
-            let layout = |description: &Description| json!(format!("{:016x}", description.fingerprint()));
-            return Ok(Some(Difference {
-                topic: topic.name.clone(),
-                stamp_ns: 0,
-                round: 0,
-                sequence: 0,
-                field: format!("layout: {words}"),
-                a: layout(&topic.message),
-                b: layout(&other.message),
-            }));
+            return Ok(Some(difference));
         }
     }
     let (mut ours, mut theirs) = (a.messages(ranks(a), true), b.messages(ranks(b), true));
@@ -163,6 +154,21 @@ pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Differenc
     }
 }
 
+/// In what the layouts of a topic differ, if they do.
+pub(crate) fn layout_difference(a: &Topic, b: &Topic) -> Option<Difference> {
+    let words = a.message.first_difference(&b.message)?;
+    let layout = |description: &Description| json!(format!("{:016x}", description.fingerprint()));
+    Some(Difference {
+        topic: a.name.clone(),
+        stamp_ns: 0,
+        round: 0,
+        sequence: 0,
+        field: format!("layout: {words}"),
+        a: layout(&a.message),
+        b: layout(&b.message),
+    })
+}
+
 fn at(recording: &Recording, message: &Message, field: &str, a: Value, b: Value) -> Difference {
     Difference {
         topic: recording.topics()[message.topic].name.clone(),
@@ -175,14 +181,14 @@ fn at(recording: &Recording, message: &Message, field: &str, a: Value, b: Value)
     }
 }
 
-fn missing(recording: &Recording, message: &Message, in_second: bool) -> Difference {
+pub(crate) fn missing(recording: &Recording, message: &Message, in_second: bool) -> Difference {
     let json = recording.topics()[message.topic].message.to_json(message.bytes());
     let (a, b) = if in_second { (json, Value::Null) } else { (Value::Null, json) };
     at(recording, message, "message", a, b)
 }
 
 /// The first thing in which two messages of one topic differ.
-fn difference(recording: &Recording, left: &Message, right: &Message) -> Option<Difference> {
+pub(crate) fn difference(recording: &Recording, left: &Message, right: &Message) -> Option<Difference> {
     let (a, b) = (&left.envelope, &right.envelope);
     let envelope = [
         ("stamp_ns", a.stamp_ns, b.stamp_ns),

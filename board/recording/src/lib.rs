@@ -7,6 +7,7 @@
 
 pub mod format;
 
+mod by_topic;
 mod cdr;
 mod compare;
 mod read;
@@ -15,6 +16,7 @@ mod write;
 #[cfg(test)]
 mod tests;
 
+pub use by_topic::{FieldDifference, TopicComparison, compare_topics};
 pub use cdr::{Codec, InvalidDescription, Misfit};
 pub use compare::{Difference, Digest, Digester, first_difference};
 pub use read::{Message, Messages, Recording};

@@ -87,6 +87,13 @@ fn changes_reach_the_command_line_in_order() {
     );
 }
 
+#[test]
+fn faults_are_varied_as_parameters_are() {
+    let plan = parsed("[across]\n'graph.fault' = [[], [{ at_s = 30.0, kill = 'planner' }]]").unwrap();
+    assert_eq!(plan.runs[0].overrides.set, ["graph.fault=[]"]);
+    assert_eq!(plan.runs[2].overrides.set, ["graph.fault=[{ at_s = 30.0, kill = \"planner\" }]"]);
+}
+
 #[track_caller]
 fn check_close(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance, "{found} is not {expected}");

@@ -1,5 +1,7 @@
 //! Whether a graph can run: every binary's word against the graph's.
 
+use super::faults::Fault;
+use super::file::Overrides;
 use super::problem::{Problem, Problems};
 use super::schema::Schema;
 use super::settings::{Graph, LaunchSettings, ServiceTable, ViewSettings};
@@ -8,7 +10,7 @@ use super::topics::{Member, connect};
 use super::tree::{Content, Entry, Node};
 use board::{Direction, Interface};
 use messages::Description;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
@@ -61,10 +63,18 @@ pub(crate) struct Checked {
     pub(crate) services: Vec<CheckedService>,
     /// The topics, in the order of their names.
     pub(crate) topics: Vec<CheckedTopic>,
+    /// What is done to services at logical moments.
+    pub(crate) faults: Vec<Fault>,
+    /// The graph as text, before the command line changed anything.
+    #[serde(skip)]
+    pub(crate) text: String,
+    /// What the command line changed.
+    #[serde(skip)]
+    pub(crate) overrides: Overrides,
 }
 
 /// A service that can run.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct CheckedService {
     /// Its name in this graph.
     pub(crate) role: String,
@@ -81,7 +91,7 @@ pub(crate) struct CheckedService {
 }
 
 /// A topic of the graph.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct CheckedTopic {
     /// Its name.
     pub(crate) name: String,
@@ -98,7 +108,7 @@ pub(crate) struct CheckedTopic {
 }
 
 /// Who publishes a topic.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Publisher {
     /// This role.
@@ -109,8 +119,18 @@ pub(crate) enum Publisher {
     Nobody,
 }
 
+impl Publisher {
+    /// The service that publishes it, if one does.
+    pub(crate) fn role(&self) -> Option<&str> {
+        match self {
+            Self::Service(role) => Some(role),
+            Self::External | Self::Nobody => None,
+        }
+    }
+}
+
 /// A reader of a topic.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Reader {
     /// The role that reads.
     pub(crate) role: String,
@@ -185,6 +205,9 @@ pub(crate) fn check(
         view: graph.view.clone(),
         services: services.collect(),
         topics,
+        faults: graph.faults.clone(),
+        text: graph.text.clone(),
+        overrides: Overrides::default(),
     })
 }
 

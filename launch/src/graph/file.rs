@@ -4,12 +4,14 @@ use super::problem::{Problem, Problems};
 use super::settings::{Graph, read_graph};
 use super::source::{Place, Source};
 use super::suggest::hint;
+use super::text::to_toml;
 use super::tree::{Content, Entry, Node, Table, parse, parse_value};
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// What the command line changes in a graph.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Overrides {
     /// `role.key=value`: parameters, `run`, and `role.launch.key`.
     pub(crate) set: Vec<String>,
@@ -34,19 +36,34 @@ pub(crate) fn load(path: &Path, overrides: &Overrides, problems: &mut Problems) 
             return None;
         }
     };
-    let source = Source::file(shown(path), text);
+    read(path, &Source::file(shown(path), text), overrides, problems)
+}
+
+/// The same of a text that was kept; `path` is where the file was, from which other files count.
+pub(crate) fn load_text(
+    path: &Path,
+    source: &Arc<Source>,
+    overrides: &Overrides,
+    problems: &mut Problems,
+) -> Option<Graph> {
+    read(path, source, overrides, problems)
+}
+
+fn read(path: &Path, source: &Arc<Source>, overrides: &Overrides, problems: &mut Problems) -> Option<Graph> {
     let mut reader = Reader { problems, open: Vec::new(), done: Vec::new() };
-    let mut table = reader.read(path, &source)?;
+    let mut table = reader.read(path, source)?;
     if reader.problems.refuse() {
         return None;
     }
-    if !table.entries.iter().any(|entry| entry.key != "graph") {
+    if !table.entries.iter().any(|entry| !is_ours(&entry.key)) {
         let help = "add a table for each service, such as [simulator]";
-        problems.push(Problem::error(&Place::top(&source), "this graph has no services", help));
+        problems.push(Problem::error(&Place::top(source), "this graph has no services", help));
         return None;
     }
+    let text = to_toml(&table);
     apply(overrides, &mut table, problems);
-    read_graph(path, &source, &table, problems)
+    let graph = read_graph(path, source, &table, problems)?;
+    Some(Graph { text, ..graph })
 }
 
 /// A path as people would type it: relative to the current folder if it lies within.
@@ -136,7 +153,7 @@ impl Reader<'_> {
     }
 
     fn refuse_siblings(&mut self, before: &Table, part: &Table) {
-        for entry in part.entries.iter().filter(|entry| entry.key != "graph") {
+        for entry in part.entries.iter().filter(|entry| !is_ours(&entry.key)) {
             if let Some(first) = before.get(&entry.key) {
                 let message = format!("[{}] is in two included files", entry.key);
                 let help = "keep one of the two; only the including file may override a table";
@@ -145,6 +162,11 @@ impl Reader<'_> {
             }
         }
     }
+}
+
+/// Whether a key at the top belongs to the graph and is no service.
+fn is_ours(key: &str) -> bool {
+    matches!(key, "graph" | "fault")
 }
 
 /// Lays `over` on `base`: services key by key, their values as wholes.
@@ -156,6 +178,11 @@ fn merge(base: &mut Table, over: Table) {
                 Some(Entry { value: Node { content: Content::Table(known), .. }, .. }),
                 Entry { value: Node { content: Content::Table(table), .. }, .. },
             ) => merge_service(known, table),
+            // Each part may bring faults of its own.
+            (
+                Some(Entry { key, value: Node { content: Content::Array(known), .. }, .. }),
+                Entry { value: Node { content: Content::Array(more), .. }, .. },
+            ) if key == "fault" => known.extend(more),
             (_, entry) => base.put(entry),
         }
     }
@@ -246,7 +273,7 @@ fn split(source: &Arc<Source>, option: &str, form: &str, problems: &mut Problems
 }
 
 fn find_service(table: &Table, role: &str, place: &Place, problems: &mut Problems) -> bool {
-    let known = table.entries.iter().map(|entry| entry.key.as_str()).filter(|key| *key != "graph");
+    let known = table.entries.iter().map(|entry| entry.key.as_str()).filter(|key| !is_ours(key));
     if known.clone().any(|key| key == role) {
         return true;
     }

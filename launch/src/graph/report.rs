@@ -4,11 +4,14 @@ use super::binaries::{Installed, processors, services_in_checkout};
 use super::build::build;
 use super::check::{Checked, check};
 use super::diagram::{dot, mermaid};
-use super::file::{Overrides, load, shown};
+use super::file::{Overrides, load, load_text, shown};
 use super::find::find;
 use super::problem::{Palette, Problem, Problems, Severity};
+use super::settings::Graph;
+use super::source::Source;
 use std::collections::HashMap;
 use std::fmt::Write as _;
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Which graph is meant, and what is different about it this time.
@@ -54,6 +57,21 @@ pub(crate) fn graph_command(request: &Request, as_dot: bool) -> ExitCode {
     ExitCode::SUCCESS
 }
 
+/// As [`prepare`], of a graph's text that was kept in a recording; `file` is where it was read from then, `name` how it is called in complaints.
+pub(crate) fn prepare_recorded(
+    name: &str,
+    text: &str,
+    file: &Path,
+    overrides: &Overrides,
+    build: bool,
+) -> Option<Checked> {
+    let mut problems = Problems::default();
+    let graph = load_text(file, &Source::file(name, text), overrides, &mut problems);
+    let checked = graph.and_then(|graph| examine_loaded(&graph, overrides, build, &mut problems));
+    eprint!("{}", listing(&problems, &Palette::of(&std::io::stderr()), false));
+    checked
+}
+
 fn examine(request: &Request, problems: &mut Problems) -> Option<Checked> {
     let path = match find(&request.graph) {
         Ok(path) => path,
@@ -63,8 +81,17 @@ fn examine(request: &Request, problems: &mut Problems) -> Option<Checked> {
         }
     };
     let graph = load(&path, &request.overrides, problems)?;
+    examine_loaded(&graph, &request.overrides, request.build, problems)
+}
+
+fn examine_loaded(
+    graph: &Graph,
+    overrides: &Overrides,
+    wants_build: bool,
+    problems: &mut Problems,
+) -> Option<Checked> {
     let mut built = HashMap::new();
-    if request.build {
+    if wants_build {
         let in_checkout = services_in_checkout();
         let mut wanted: Vec<_> = graph.services.iter().map(|service| service.run.clone()).collect();
         wanted.retain(|run| in_checkout.contains(run));
@@ -79,7 +106,8 @@ fn examine(request: &Request, problems: &mut Problems) -> Option<Checked> {
         }
     }
     let binaries = Installed { folder: graph.folder.clone(), built };
-    check(&graph, &binaries, processors(), problems)
+    let checked = check(graph, &binaries, processors(), problems)?;
+    Some(Checked { overrides: overrides.clone(), ..checked })
 }
 
 fn listing(problems: &Problems, palette: &Palette, with_notes: bool) -> String {

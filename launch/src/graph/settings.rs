@@ -1,15 +1,18 @@
 //! What the tables of a graph file mean to the launcher.
 
+use super::faults::{Fault, read_faults};
 use super::file::shown;
 use super::problem::{Problem, Problems};
 use super::source::{Place, Source};
 use super::suggest::hint;
 use super::tree::{Content, Entry, Node, Table};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+/// No computer of a robot takes longer for a step.
+const COMPUTE_MAX_MS: f64 = 60_000.0;
 /// Longest name of a role, so that `health/<role>` and the like stay short enough for the transport.
 const ROLE_MAX: usize = 40;
 
@@ -32,8 +35,12 @@ pub(crate) struct Graph {
     pub(crate) defaults: Vec<Entry>,
     /// What the live view shows.
     pub(crate) view: ViewSettings,
+    /// What is done to services at logical moments.
+    pub(crate) faults: Vec<Fault>,
     /// The services, in the order of the file.
     pub(crate) services: Vec<ServiceTable>,
+    /// The file with all that it includes, before the command line changed anything.
+    pub(crate) text: String,
 }
 
 /// One service's table.
@@ -56,7 +63,7 @@ pub(crate) struct ServiceTable {
 }
 
 /// What the launcher, not the service, reads: `[role.launch]`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct LaunchSettings {
     /// When a dead service is started again; `None` for never.
     pub(crate) restart: Option<Restart>,
@@ -64,7 +71,7 @@ pub(crate) struct LaunchSettings {
     pub(crate) cpu: Vec<usize>,
     /// How the operating system ranks it.
     pub(crate) priority: Priority,
-    /// Lockstep: how long after a step its messages become visible.
+    /// Lockstep: how long a step takes, after which its messages are seen and the next step may begin; `None` for no time at all.
     pub(crate) compute: Option<Duration>,
     /// How long its heartbeat may be silent.
     pub(crate) hang_after: Duration,
@@ -75,7 +82,7 @@ pub(crate) struct LaunchSettings {
 }
 
 /// When a dead service is started again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Restart {
     /// Wait before the first restart.
     pub(crate) backoff_min: Duration,
@@ -85,8 +92,19 @@ pub(crate) struct Restart {
     pub(crate) give_up_after: u32,
 }
 
+impl Restart {
+    /// The wait after so many deaths in a row; `None` when the service counts as broken. The first restart is immediate.
+    pub(crate) fn pause_after(&self, deaths: u32) -> Option<Duration> {
+        match deaths {
+            _ if deaths > self.give_up_after => None,
+            0 | 1 => Some(Duration::ZERO),
+            _ => Some((self.backoff_min * 2_u32.pow((deaths - 2).min(20))).min(self.backoff_max)),
+        }
+    }
+}
+
 /// How the operating system ranks a process.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Priority {
     /// As any other.
@@ -174,10 +192,17 @@ pub(crate) fn read_graph(
         external: Vec::new(),
         defaults: Vec::new(),
         view: ViewSettings::default(),
+        faults: Vec::new(),
         services: Vec::new(),
+        text: String::new(),
     };
+    let (mut faults, mut other_faults) = (None, None);
     let mut name_place = Place::top(source);
     for entry in &table.entries {
+        if entry.key == "fault" && entry.value.table().is_none() {
+            faults = Some(entry);
+            continue;
+        }
         let Some(content) = entry.value.table() else {
             let message = format!("`{}` stands outside of any table", entry.key);
             let help = "put it below [graph], or below the table of a service";
@@ -185,10 +210,16 @@ pub(crate) fn read_graph(
             continue;
         };
         if entry.key == "graph" {
+            other_faults = content.get("fault");
             read_graph_table(&mut graph, &mut name_place, content, problems);
         } else {
             graph.services.push(read_service(entry, content, problems));
         }
+    }
+    // Those that an experiment or the command line sets replace those of the file.
+    if let Some(entry) = other_faults.or(faults) {
+        let roles: Vec<&str> = graph.services.iter().map(|service| service.role.as_str()).collect();
+        graph.faults = read_faults(entry, &roles, problems);
     }
     if graph.view.world.is_none() {
         let world = graph.defaults.iter().find(|entry| entry.key == "world");
@@ -208,7 +239,7 @@ pub(crate) fn read_graph(
 }
 
 fn read_graph_table(graph: &mut Graph, name_place: &mut Place, table: &Table, problems: &mut Problems) {
-    const KEYS: [&str; 7] = ["name", "include", "seed", "finish", "external", "defaults", "view"];
+    const KEYS: [&str; 8] = ["name", "include", "seed", "finish", "external", "defaults", "view", "fault"];
     for entry in &table.entries {
         let value = &entry.value;
         match entry.key.as_str() {
@@ -254,7 +285,7 @@ fn read_graph_table(graph: &mut Graph, name_place: &mut Place, table: &Table, pr
                     read_view(&mut graph.view, &graph.folder, view, problems);
                 }
             }
-            "include" => {}
+            "include" | "fault" => {}
             _ => refuse_key(entry, "[graph]", &KEYS, problems),
         }
     }
@@ -353,7 +384,14 @@ fn read_launch(launch: &mut LaunchSettings, role: &str, table: &Table, problems:
                     launch.priority = priority;
                 }
             }
-            "compute_ms" => launch.compute = milliseconds(entry, value, problems).or(launch.compute),
+            "compute_ms" => {
+                let number = value.number().filter(|number| (0.0..=COMPUTE_MAX_MS).contains(number));
+                let wanted = "milliseconds from 0 to 60000: how long a step takes in lockstep";
+                if let Some(number) = take(number, entry, wanted, problems) {
+                    let nanos = (number * 1e6).round() as u64;
+                    launch.compute = (nanos > 0).then(|| Duration::from_nanos(nanos));
+                }
+            }
             "hang_after_ms" => {
                 launch.hang_after = milliseconds(entry, value, problems).unwrap_or(launch.hang_after);
             }
@@ -446,7 +484,7 @@ fn milliseconds(entry: &Entry, value: &Node, problems: &mut Problems) -> Option<
 }
 
 /// The value, or a problem that says what the key takes.
-fn take<T>(value: Option<T>, entry: &Entry, wanted: &str, problems: &mut Problems) -> Option<T> {
+pub(super) fn take<T>(value: Option<T>, entry: &Entry, wanted: &str, problems: &mut Problems) -> Option<T> {
     if value.is_none() {
         let written = entry.value.place.text();
         let message = if written.is_empty() || written.contains('\n') || entry.value.table().is_some() {
@@ -459,7 +497,7 @@ fn take<T>(value: Option<T>, entry: &Entry, wanted: &str, problems: &mut Problem
     value
 }
 
-fn refuse_key(entry: &Entry, table: &str, known: &[&str], problems: &mut Problems) {
+pub(super) fn refuse_key(entry: &Entry, table: &str, known: &[&str], problems: &mut Problems) {
     let message = format!("{table} has no key `{}`", entry.key);
     let help = hint(&entry.key, known.iter().copied(), "its keys");
     problems.push(Problem::error(&entry.key_place, message, help));

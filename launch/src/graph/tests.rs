@@ -2,12 +2,14 @@
 
 use super::check::{Binaries, Checked, NotFound, Publisher, QueryError, check};
 use super::diagram::{dot, mermaid};
+use super::faults::{Fault, FaultKind};
 use super::file::{Overrides, load};
 use super::problem::{Palette, Problems, Severity};
 use board::{Direction, Interface, PortDescription};
 use messages::{Description, FieldDescription, Kind, Message as _, RunSummary};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// A right graph: every wrong one is made from it by one replacement.
 const RIGHT: &str = r#"[graph]
@@ -355,6 +357,8 @@ fn tables_of_the_launcher() {
     refused("fifo = 40", "fifo = 100", "test.toml:22:12: error: `priority` takes \"normal\", { fifo = 1 to 99 } or { nice = -20 to 19 }", "write such a value");
     refused("cpu = [1]", "hang_after_ms = -5", "test.toml:21:17: error: `hang_after_ms` takes milliseconds, not negative, not -5", "write such a value");
     refused("cpu = [1]", "log = \"a=b=c\"", "test.toml:21:7: error: `log` takes off, error, warn, info, debug, trace, or directives such as \"info,planner=debug\", not \"a=b=c\"", "");
+    refused("cpu = [1]", "compute_ms = -1", "test.toml:21:14: error: `compute_ms` takes milliseconds from 0 to 60000: how long a step takes in lockstep, not -1", "write such a value");
+    refused("cpu = [1]", "compute_ms = 70e3", "test.toml:21:14: error: `compute_ms` takes milliseconds from 0 to 60000: how long a step takes in lockstep, not 70e3", "write such a value");
     refused("[graph]", "seed = 1\n[graph]", "test.toml:1:1: error: `seed` stands outside of any table", "below [graph]");
     refused("[simulator]\n", "[graph.view]\nworld = \"none.toml\"\n[simulator]\n", "test.toml:10:9: error: there is no world file none.toml", "the name counts from");
     refused("[simulator]\n", "[graph.view]\nwrold = \"none.toml\"\n[simulator]\n", "test.toml:10:1: error: [graph.view] has no key `wrold`", "did you mean `world`?");
@@ -386,6 +390,59 @@ fn includes() {
         "first here: parts/a.toml:1:2",
     );
     refused("name = ", "include = [3]\nname = ", "test.toml:2:12: error: `include` takes names of files, not an integer", "write include");
+}
+
+#[test]
+#[rustfmt::skip]
+fn faults() {
+    refused_with("[[fault]]\nkill = \"planner\"\n", "test.toml:25:1: error: a fault lacks `at_s`, its logical moment", "{ at_s = 12.0, kill = \"planner\" }");
+    refused_with("[[fault]]\nat_s = 1\n", "test.toml:25:1: error: a fault has either `kill` or `stop`", "{ at_s = 12.0, kill");
+    refused_with("[[fault]]\nat_s = 1\nkill = \"planner\"\nstop = \"planner\"\n", "test.toml:25:1: error: a fault has either `kill` or `stop`", "{ at_s = 12.0, kill");
+    refused_with("[[fault]]\nat_s = -1\nkill = \"planner\"\n", "test.toml:26:8: error: `at_s` takes seconds of logical time, not negative, not -1", "write such a value");
+    refused_with("[[fault]]\nat_s = 1\nkill = \"planer\"\n", "test.toml:27:8: error: the graph has no service `planer`", "did you mean `planner`?");
+    refused_with("[[fault]]\nat_s = 1\nkill = 3\n", "test.toml:27:8: error: `kill` takes the name of a service, not 3", "write such a value");
+    refused_with("[[fault]]\nat_s = 1\nkill = \"planner\"\nfor_s = 2\n", "test.toml:28:1: error: `for_s` means nothing to `kill`", "how long a stopped service hangs");
+    refused_with("[[fault]]\nat_s = 1\nstop = \"planner\"\ndown_s = 2\n", "test.toml:28:1: error: `down_s` means nothing to `stop`", "first step");
+    refused_with("[[fault]]\nat_s = 1\nstop = \"planner\"\nfro_s = 2\n", "test.toml:28:1: error: a fault has no key `fro_s`", "did you mean `for_s`?");
+    refused_override(set("graph.fault=[3]"), "command line: error: `fault` takes tables, not an integer", "write tables");
+}
+
+fn checked(text: &str, overrides: Overrides) -> Checked {
+    let (checked, problems) = Case { overrides, ..Case::new(&[("test.toml", text)]) }.run();
+    checked.unwrap_or_else(|| panic!("{:#?}", problems.sorted()))
+}
+
+#[test]
+fn faults_and_computing_times_are_read() {
+    let text = RIGHT.replace("cpu = [1]", "compute_ms = 2.5")
+        + "[[fault]]\nat_s = 12.5\nkill = \"planner\"\n[[fault]]\nat_s = 3\nstop = \"referee\"\nfor_s = 0.5\n";
+    let graph = checked(&text, Overrides::default());
+    assert_eq!(graph.services[2].launch.compute, Some(Duration::from_micros(2500)));
+    let (kill, stop) =
+        (FaultKind::Kill { down: None }, FaultKind::Stop { lasting: Some(Duration::from_millis(500)) });
+    let fault =
+        |at_ms, role: &str, kind| Fault { at: Duration::from_millis(at_ms), role: role.to_owned(), kind };
+    assert_eq!(graph.faults, [fault(12_500, "planner", kill), fault(3000, "referee", stop)]);
+    let other = checked(&text, set("graph.fault=[{ at_s = 1, kill = \"planner\", down_s = 2 }]"));
+    let kill = FaultKind::Kill { down: Some(Duration::from_secs(2)) };
+    assert_eq!(other.faults, [fault(1000, "planner", kill)]);
+    assert_eq!(checked(&text, set("graph.fault=[]")).faults, []);
+}
+
+#[test]
+fn the_text_of_a_graph_reads_back_as_the_same_graph() {
+    let text = RIGHT.replace("room = \"207\"", "room = \"a \\\"quoted\\\" \\\\ name\\n\"")
+        + "[[fault]]\nat_s = 12.5\nkill = \"planner\"\n";
+    let first = checked(&text, Overrides::default());
+    let second = checked(&first.text, Overrides::default());
+    assert_eq!(first.text, second.text);
+    let json = |graph: &Checked| {
+        let mut json = serde_json::to_value(graph).unwrap();
+        // Each case has a folder of its own.
+        let _ = ["file", "folder"].map(|key| json[key].take());
+        json
+    };
+    assert_eq!(json(&first), json(&second));
 }
 
 #[test]

@@ -54,6 +54,7 @@ fn service(role: &str, state: &str, restarts: u32) -> ServiceStatus {
         late_steps: 0,
         lost_messages: u64::from(restarts),
         invalid_messages: 0,
+        swap: None,
     }
 }
 
@@ -88,6 +89,7 @@ fn snapshot() -> Snapshot {
     summary.push("time at door", f64::NAN, "s");
     Snapshot {
         status: Status {
+            overrides: crate::graph::Overrides::default(),
             board: "coffee".to_owned(),
             graph: "graphs/coffee.toml".to_owned(),
             launcher_pid: 1,

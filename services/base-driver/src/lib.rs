@@ -10,6 +10,7 @@ mod params;
 mod tests;
 
 pub use device::{BaseDevice, DeviceError, SimulatedBase, WheelTravel};
+pub use odometry::Snapshot;
 pub use params::{Device, Params, ParamsError};
 
 use messages::{
@@ -61,6 +62,16 @@ impl BaseDriver {
         params.check()?;
         let reckoning = DeadReckoning::new(params.wheel_track_m, params.period());
         Ok(Self { params, applied: AppliedWheels::default(), last_step: None, escape_began: None, reckoning })
+    }
+
+    /// What a successor needs so that the odometry goes on in the same frame; of the command nothing is kept, since who starts begins safe.
+    pub fn snapshot(&self) -> Option<Snapshot> {
+        self.reckoning.snapshot()
+    }
+
+    /// Takes over the odometry of a predecessor, before the first step.
+    pub fn restore(&mut self, snapshot: &Snapshot) {
+        self.reckoning.restore(snapshot);
     }
 
     /// Decides what the wheels do from now on, and counts how far they went.

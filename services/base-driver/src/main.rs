@@ -1,6 +1,6 @@
 //! The process around `base_driver`.
-use base_driver::{BaseDevice, BaseDriver, Device, Inputs, Params};
-use board::{Latest, Publisher};
+use base_driver::{BaseDevice, BaseDriver, Device, Inputs, Params, Snapshot};
+use board::{Kept, Latest, Publisher};
 use messages::{AppliedWheels, Clearance, Odometry, Time, WheelSpeeds, WorldTruth};
 use std::process::ExitCode;
 
@@ -9,6 +9,7 @@ struct Base {
     driver: BaseDriver,
     device: Box<dyn BaseDevice>,
     applied: Publisher<AppliedWheels>,
+    kept: Kept<Snapshot>,
     has_stepped: bool,
 }
 
@@ -23,6 +24,9 @@ impl Base {
         self.applied.publish(&outputs.applied);
         if let Some(odometry) = outputs.odometry {
             ports.odometry.publish(&odometry);
+        }
+        if let Some(snapshot) = self.driver.snapshot() {
+            self.kept.save_now_and_then(now, || snapshot);
         }
         self.has_stepped = true;
     }
@@ -59,7 +63,12 @@ fn main() -> ExitCode {
         node.wake_on(&ports.desired);
         node.every(params.period());
         let device = params.open_device();
-        let mut base = Base { driver: BaseDriver::new(params)?, device, applied, has_stepped: false };
+        let mut driver = BaseDriver::new(params)?;
+        let kept = node.kept();
+        if let Some(snapshot) = kept.restore() {
+            driver.restore(&snapshot);
+        }
+        let mut base = Base { driver, device, applied, kept, has_stepped: false };
         Ok(move |now| base.step(now, &mut ports))
     })
 }

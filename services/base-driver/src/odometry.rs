@@ -3,10 +3,24 @@
 use crate::WheelTravel;
 use geometry::Pose2;
 use messages::{Odometry, Time};
+use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// Faster than this no wheel of such a robot turns: a larger jump is an encoder that began anew.
 const FASTEST_MPS: f64 = 5.0;
+
+/// An encoder that is farther than this from where a predecessor left it began anew.
+const RESUMED_WITHIN_M: f64 = 5.0;
+
+/// Where the odometry of a predecessor stood, and what its encoders said then.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    x_m: f64,
+    y_m: f64,
+    heading_rad: f64,
+    travelled: [f64; 2],
+    encoders: [f64; 2],
+}
 
 /// The pose since the start, by exact arcs.
 #[derive(Debug, Clone)]
@@ -17,12 +31,42 @@ pub(crate) struct DeadReckoning {
     last: Option<(Time, WheelTravel)>,
     pose: Pose2,
     travelled: WheelTravel,
+    /// Where the encoders stood when the predecessor last said so.
+    resumed: Option<WheelTravel>,
 }
 
 impl DeadReckoning {
     pub(crate) fn new(wheel_track_m: f64, period: Duration) -> Self {
         let travelled = WheelTravel::default();
-        Self { wheel_track_m, period, next: None, last: None, pose: Pose2::IDENTITY, travelled }
+        Self {
+            wheel_track_m,
+            period,
+            next: None,
+            last: None,
+            pose: Pose2::IDENTITY,
+            travelled,
+            resumed: None,
+        }
+    }
+
+    /// What a successor needs to go on in the same frame; `None` before the first reading.
+    pub(crate) fn snapshot(&self) -> Option<Snapshot> {
+        let (_, encoders) = self.last?;
+        let Pose2 { x_m, y_m, heading_rad } = self.pose;
+        let pair = |travel: WheelTravel| [travel.left_m, travel.right_m];
+        Some(Snapshot { x_m, y_m, heading_rad, travelled: pair(self.travelled), encoders: pair(encoders) })
+    }
+
+    /// Goes on where a predecessor was: the encoders tell how far the wheels went meanwhile.
+    pub(crate) fn restore(&mut self, snapshot: &Snapshot) {
+        let Snapshot { x_m, y_m, heading_rad, travelled, encoders } = *snapshot;
+        let numbers = [x_m, y_m, heading_rad].into_iter().chain(travelled).chain(encoders);
+        if self.last.is_none() && numbers.into_iter().all(f64::is_finite) {
+            self.pose = Pose2::new(x_m, y_m, heading_rad);
+            let travel = |[left_m, right_m]: [f64; 2]| WheelTravel { left_m, right_m };
+            self.travelled = travel(travelled);
+            self.resumed = Some(travel(encoders));
+        }
     }
 
     /// Once a period, while the encoders answer, the odometry until now.
@@ -36,10 +80,12 @@ impl DeadReckoning {
         let planned = self.next.map_or(now, |next| next.after(self.period));
         self.next = Some(if planned > now { planned } else { now.after(self.period) });
 
-        let (stamp, before) = self.last.replace((now, travel)).unwrap_or((now, travel));
+        let resumed = self.resumed.take();
+        let (stamp, before) = self.last.replace((now, travel)).unwrap_or((now, resumed.unwrap_or(travel)));
         let seconds = now.seconds_since(stamp);
         let (mut left_m, mut right_m) = (travel.left_m - before.left_m, travel.right_m - before.right_m);
-        if left_m.abs().max(right_m.abs()) > FASTEST_MPS * seconds {
+        let most_m = if resumed.is_some() { RESUMED_WITHIN_M } else { FASTEST_MPS * seconds };
+        if left_m.abs().max(right_m.abs()) > most_m {
             (left_m, right_m) = (0.0, 0.0);
         }
         let (forward_m, turn_rad) = (0.5 * (left_m + right_m), (right_m - left_m) / self.wheel_track_m);

@@ -367,3 +367,27 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_successor_goes_on_with_the_odometry_of_its_predecessor() {
+    let step = |driver: &mut BaseDriver, ms: u64, left_m: f64| {
+        let travel = Some(WheelTravel { left_m, right_m: left_m });
+        driver.step(at(ms), Inputs { travel, ..Inputs::default() }).odometry
+    };
+    let mut driver = BaseDriver::new(Params::default()).unwrap();
+    assert_eq!(driver.snapshot(), None);
+    step(&mut driver, 0, 7.0);
+    step(&mut driver, 1000, 7.5);
+    let snapshot = driver.snapshot().expect("it has read its encoders");
+    // The robot rolled on by 30 mm before anybody looked again.
+    let mut successor = BaseDriver::new(Params::default()).unwrap();
+    successor.restore(&snapshot);
+    let odometry = step(&mut successor, 1500, 7.53).expect("due");
+    assert!((odometry.x_m - 0.53).abs() < 1e-12, "{odometry:?}");
+    assert_eq!(odometry.forward_mps, 0.0);
+    assert_eq!(successor.applied.reason, DriveReasonName::StaleGuard);
+    // Encoders that lost power meanwhile tell nothing.
+    let mut successor = BaseDriver::new(Params::default()).unwrap();
+    successor.restore(&snapshot);
+    assert!((step(&mut successor, 1500, 0.0).expect("due").x_m - 0.5).abs() < 1e-12);
+}

@@ -35,6 +35,8 @@ mod tests;
 
 pub use params::{Params, ParamsError, Sensor};
 
+pub use memory::Snapshot;
+
 use memory::{Memory, Motion};
 use messages::{
     Clearance, Face, GuardReasonName, Odometry, Parameters, RangeScan, Reading, Stamped, TOF_COUNT, Time,
@@ -128,6 +130,16 @@ impl CollisionAvoidance {
             verdict: Verdict::Stop,
             changes: 0,
         })
+    }
+
+    /// What a successor needs to remember; it begins with STOP all the same.
+    pub fn snapshot(&self) -> Snapshot {
+        self.memory.snapshot()
+    }
+
+    /// Takes over what a predecessor remembered, before the first step.
+    pub fn restore(&mut self, snapshot: &Snapshot) {
+        self.memory.restore(snapshot);
     }
 
     /// Judges the newest frame; a frame seen before counts once. Call it for every frame and once a heartbeat.

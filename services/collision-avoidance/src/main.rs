@@ -1,5 +1,5 @@
 //! The process around `collision_avoidance`.
-use collision_avoidance::{CollisionAvoidance, Inputs, Params, Sensor};
+use collision_avoidance::{CollisionAvoidance, Inputs, Params, Sensor, Snapshot};
 use messages::{Clearance, Odometry, RangeScan, TofRanges};
 use std::process::ExitCode;
 
@@ -19,7 +19,11 @@ fn main() -> ExitCode {
             node.wake_on(scan);
         }
         node.every(params.period());
+        let mut kept = node.kept::<Snapshot>();
         let mut guard = CollisionAvoidance::new(params)?;
+        if let Some(snapshot) = kept.restore() {
+            guard.restore(&snapshot);
+        }
         Ok(move |now| {
             let inputs = Inputs {
                 ranges: ranges.as_mut().and_then(|ranges| ranges.read()),
@@ -27,6 +31,7 @@ fn main() -> ExitCode {
                 odometry: odometry.read(),
             };
             clearance.publish(&guard.step(now, inputs).clearance);
+            kept.save_now_and_then(now, || guard.snapshot());
         })
     })
 }

@@ -3,6 +3,7 @@
 use crate::Params;
 use geometry::{Point2, Pose2};
 use messages::{Time, TofRanges};
+use serde::{Deserialize, Serialize};
 
 /// The front sensors.
 const FRONT: std::ops::Range<usize> = 2..6;
@@ -36,6 +37,16 @@ impl Sight {
     }
 }
 
+/// What was near, and what of it vanished, when a predecessor last said so: per front sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    seen: [Option<KeptSight>; FRONT_COUNT],
+    vanished: [Option<KeptSight>; FRONT_COUNT],
+}
+
+/// A sight in the robot's frame, and in that of odometry.
+type KeptSight = ([f64; 2], Option<[f64; 2]>);
+
 /// The memory for obstacles in front.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Memory {
@@ -48,6 +59,26 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
+    /// What a successor needs: an obstacle that was remembered must not be driven over because the guard was started anew.
+    pub(crate) fn snapshot(&self) -> Snapshot {
+        let pair = |place: Point2<f64>| [place.x, place.y];
+        let kept = |sight: Sight| (pair(sight.in_body), sight.in_odometry.map(pair));
+        Snapshot {
+            seen: self.seen.map(|sight| sight.map(kept)),
+            vanished: self.vanished.map(|sight| sight.map(kept)),
+        }
+    }
+
+    /// Takes over what a predecessor remembered.
+    pub(crate) fn restore(&mut self, snapshot: &Snapshot) {
+        let place = |[x, y]: [f64; 2]| (x.is_finite() && y.is_finite()).then(|| Point2::new(x, y));
+        let sight = |(in_body, in_odometry): KeptSight| {
+            Some(Sight { in_body: place(in_body)?, in_odometry: in_odometry.and_then(place) })
+        };
+        self.seen = snapshot.seen.map(|kept| kept.and_then(sight));
+        self.vanished = snapshot.vanished.map(|kept| kept.and_then(sight));
+    }
+
     /// Takes in one frame: the new readings of the sensors (`None` where a sensor gave none; infinite for "no target").
     pub(crate) fn take(
         &mut self,

@@ -627,3 +627,20 @@ proptest! {
         prop_assert!(said.front_m >= 0.0 && said.right_m >= 0.0 && said.left_m >= 0.0);
     }
 }
+
+#[test]
+fn a_successor_remembers_what_its_predecessor_saw_vanish() {
+    let mut bench = Bench::new(Params::default());
+    bench.feed_times(3, &ahead([FAR; 4]));
+    bench.feed_times(3, &ahead([FAR, 0.15, FAR, FAR]));
+    // It vanishes while nobody looks: the successor knows where it was.
+    let snapshot = bench.guard.snapshot();
+    let text = serde_json::to_string(&snapshot).unwrap();
+    let mut successor = Bench::new(Params::default());
+    successor.guard.restore(&serde_json::from_str(&text).unwrap());
+    successor.feed_times(5, &ahead([FAR; 4]));
+    successor.expect(Verdict::Stop, Why::Remembered);
+    let mut forgetful = Bench::new(Params::default());
+    forgetful.feed_times(5, &ahead([FAR; 4]));
+    forgetful.expect(Verdict::Go, Why::Clear);
+}

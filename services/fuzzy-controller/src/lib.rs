@@ -27,6 +27,7 @@ use messages::{
 };
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::time::Duration;
+pub use surround::Snapshot;
 use surround::Surround;
 
 /// In the rule files avoidance takes over at this clearance; clearances are scaled to it.
@@ -170,6 +171,16 @@ impl FuzzyController {
     /// The three controllers with the activations of their rules in the last step that they took part in.
     pub fn controllers(&self) -> &Controllers {
         &self.controllers
+    }
+
+    /// What a successor needs to know of the robot's surroundings.
+    pub fn snapshot(&self) -> Snapshot {
+        self.surround.snapshot()
+    }
+
+    /// Takes over what a predecessor knew of the robot's surroundings, before the first step.
+    pub fn restore(&mut self, snapshot: &Snapshot) {
+        self.surround.restore(snapshot);
     }
 
     /// The wheel speeds for now.

@@ -1,5 +1,5 @@
 //! The process around `fuzzy_controller`.
-use fuzzy_controller::{FuzzyController, Inputs, Params, RangeSource};
+use fuzzy_controller::{FuzzyController, Inputs, Params, RangeSource, Snapshot};
 use messages::{DriveCommand, Odometry, Path, PoseEstimate, RangeScan, TofRanges, WheelSpeeds};
 use std::process::ExitCode;
 
@@ -20,7 +20,11 @@ fn main() -> ExitCode {
         let mut odometry = node.optional::<Odometry>("wheels/odometry")?;
         let mut wheels = node.publisher::<WheelSpeeds>("wheels/desired")?;
         node.every(params.period());
+        let mut kept = node.kept::<Snapshot>();
         let mut controller = FuzzyController::new(params)?;
+        if let Some(snapshot) = kept.restore() {
+            controller.restore(&snapshot);
+        }
         let mut blocked = false;
         Ok(move |now| {
             let outputs = controller.step(
@@ -39,6 +43,7 @@ fn main() -> ExitCode {
             }
             blocked = outputs.blocked;
             wheels.publish(&outputs.wheels);
+            kept.save_now_and_then(now, || controller.snapshot());
         })
     })
 }

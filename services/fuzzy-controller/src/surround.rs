@@ -8,6 +8,7 @@ use crate::controllers::Wheels;
 use crate::params::Params;
 use geometry::{Point2, Pose2, Segment, Vector2};
 use messages::{Reading, TOF_COUNT, Time, TofRanges};
+use serde::{Deserialize, Serialize};
 
 /// Readings up to here are remembered.
 const SEEN_WITHIN_M: f64 = 0.8;
@@ -73,7 +74,36 @@ pub(crate) struct Surround {
     doubted_since: Option<Time>,
 }
 
+/// What was seen around the robot when a predecessor last said so: places in the frame of odometry in millimetres, how sure, and when.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    points: Vec<(i32, i32, u8, u64)>,
+    assumed: Vec<(i32, i32, u8, u64)>,
+}
+
 impl Surround {
+    /// What a successor needs: it must not turn into what lies in the gaps between the sensors.
+    pub(crate) fn snapshot(&self) -> Snapshot {
+        let mm = |metres: f64| (metres * 1e3).round() as i32;
+        let kept =
+            |point: &Point| (mm(point.place.x), mm(point.place.y), point.weight, point.seen.as_nanos());
+        Snapshot {
+            points: self.points.iter().map(kept).collect(),
+            assumed: self.assumed.iter().map(kept).collect(),
+        }
+    }
+
+    /// Takes over what a predecessor saw.
+    pub(crate) fn restore(&mut self, snapshot: &Snapshot) {
+        let point = |&(x_mm, y_mm, weight, seen): &(i32, i32, u8, u64)| Point {
+            place: Point2::new(f64::from(x_mm) / 1e3, f64::from(y_mm) / 1e3),
+            weight,
+            seen: Time::from_nanos(seen),
+        };
+        self.points = snapshot.points.iter().take(POINTS_MAX).map(point).collect();
+        self.assumed = snapshot.assumed.iter().take(POINTS_MAX).map(point).collect();
+    }
+
     /// Takes in the newest readings, with the robot at `here` in the frame of odometry; without a place nothing is known.
     pub(crate) fn observe(
         &mut self,
@@ -350,5 +380,28 @@ mod tests {
         assert!(look(2, 2.0) > 0, "one look past it does not free it");
         let left = (3..=20).map(|tenths| look(tenths, 2.0)).last();
         assert_eq!(left, Some(0));
+    }
+}
+
+#[cfg(test)]
+mod kept {
+    use super::*;
+
+    #[test]
+    fn a_successor_knows_what_its_predecessor_saw() {
+        let (now, params) = (Time::from_secs_f64(1.0), Params::default());
+        let mut ranges = TofRanges::default();
+        ranges.range_m[3] = 0.5;
+        let mut first = Surround::default();
+        first.observe(now, Some(Pose2::IDENTITY), Some((now, &ranges)), &params);
+        assert!(!first.points.is_empty());
+        let text = serde_json::to_string(&first.snapshot()).unwrap();
+        let mut successor = Surround::default();
+        successor.restore(&serde_json::from_str(&text).unwrap());
+        assert_eq!(successor.snapshot(), first.snapshot());
+        // A millimetre is as fine as the sensors are.
+        for (a, b) in first.points.iter().zip(&successor.points) {
+            assert!((a.place - b.place).norm() < 1e-3 && a.weight == b.weight);
+        }
     }
 }

@@ -28,6 +28,7 @@ use messages::{
     Stamped, TagRanges, Time, TofRanges,
 };
 use places::{PLACE_LIMIT, Places};
+use serde::{Deserialize, Serialize};
 
 /// What a step sees. A message seen before is recognised by its stamp and count, and not used again, odometry excepted, which is a state.
 #[derive(Debug, Clone, Copy, Default)]
@@ -83,6 +84,20 @@ pub struct TagLocaliser {
     known: bool,
 }
 
+/// A belief that was taken over is at least so uncertain: it is some moments old.
+const RESTORED_SIGMA_M: f64 = 0.05;
+const RESTORED_SIGMA_RAD: f64 = 0.01;
+
+/// Where a predecessor believed the robot, and what odometry said then.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    pose: [f64; 3],
+    sigma_m: f64,
+    sigma_rad: f64,
+    floor: i32,
+    odometry: Option<[f64; 3]>,
+}
+
 /// The stamps, and publisher's counts, of the messages used last.
 #[derive(Debug, Clone, Copy, Default)]
 struct Seen {
@@ -124,6 +139,33 @@ impl TagLocaliser {
             disagreeing_sides: 0.0,
             unexplained: 0,
         })
+    }
+
+    /// What a successor needs to go on where this one was; `None` while the robot is not known to be anywhere.
+    pub fn snapshot(&self) -> Option<Snapshot> {
+        let best = self.bank.estimate().filter(|best| self.known && best.sigma_m() < KNOWN_SIGMA_M)?;
+        let pair = |pose: Pose2| [pose.x_m, pose.y_m, pose.heading_rad];
+        Some(Snapshot {
+            pose: pair(best.pose),
+            sigma_m: best.sigma_m(),
+            sigma_rad: best.sigma_rad(),
+            floor: self.floor?,
+            odometry: self.odometry.map(pair),
+        })
+    }
+
+    /// Takes over the belief of a predecessor, before the first step. Odometry tells how far the robot went meanwhile.
+    pub fn restore(&mut self, snapshot: &Snapshot) {
+        let Snapshot { pose, sigma_m, sigma_rad, floor, odometry } = *snapshot;
+        let numbers = pose.into_iter().chain(odometry.into_iter().flatten()).chain([sigma_m, sigma_rad]);
+        if !numbers.into_iter().all(f64::is_finite) {
+            return;
+        }
+        let of = |[x_m, y_m, heading_rad]: [f64; 3]| Pose2::new(x_m, y_m, heading_rad);
+        let (sigma_m, sigma_rad) = (sigma_m.max(RESTORED_SIGMA_M), sigma_rad.max(RESTORED_SIGMA_RAD));
+        self.bank = Bank::new();
+        self.bank.push(Hypothesis::new(of(pose), sigma_m, sigma_rad, 0.0, self.params.outlier_chance));
+        (self.floor, self.odometry, self.known) = (Some(floor), odometry.map(of), true);
     }
 
     /// Moves the belief with odometry, corrects it with what is new, and says where the robot is.

@@ -3,7 +3,7 @@ use geometry::World;
 use messages::{HeadingCorrection, Odometry, PoseEstimate, TagRanges, TofRanges};
 use std::process::ExitCode;
 use std::time::Duration;
-use tag_localiser::{HallwayWalls, Inputs, Params, TagLocaliser};
+use tag_localiser::{HallwayWalls, Inputs, Params, Snapshot, TagLocaliser};
 
 fn main() -> ExitCode {
     board::run(board::about!(), |node, params: Params| {
@@ -19,7 +19,11 @@ fn main() -> ExitCode {
             "" => HallwayWalls::default(),
             file => HallwayWalls::of(&World::load(file)?),
         };
+        let mut kept = node.kept::<Snapshot>();
         let mut localiser = TagLocaliser::new(params, walls)?;
+        if let Some(snapshot) = kept.restore() {
+            localiser.restore(&snapshot);
+        }
         Ok(move |now| {
             let mut outputs = localiser.step(
                 now,
@@ -34,6 +38,9 @@ fn main() -> ExitCode {
                 outputs = localiser.step(now, Inputs { tag: Some(tag), ..Inputs::default() });
             }
             pose.publish(&outputs.pose);
+            if let Some(snapshot) = localiser.snapshot() {
+                kept.save_now_and_then(now, || snapshot);
+            }
         })
     })
 }

@@ -385,3 +385,27 @@ proptest::proptest! {
         }
     }
 }
+
+#[test]
+fn a_successor_goes_on_where_its_predecessor_was() {
+    let mut first = localiser(known_start());
+    assert!(first.snapshot().is_none(), "nothing was heard yet");
+    let odometry = |x_m: f64| Odometry { x_m, ..Odometry::default() };
+    for step in 0..20_u32 {
+        let now = f64::from(step) * 0.1;
+        let still = odometry(5.0);
+        first.step(at(now), Inputs { odometry: Some(Stamped::new(at(now), &still)), ..Inputs::default() });
+        hear(&mut first, now, &tag_at(Pose2::new(2.0, 1.0, 0.0)));
+    }
+    let text = serde_json::to_string(&first.snapshot().expect("it knows the place")).unwrap();
+    let mut successor = localiser(Params::default());
+    successor.restore(&serde_json::from_str(&text).unwrap());
+    // The robot went on by 0.2 m while nobody looked.
+    let moved = odometry(5.2);
+    let pose = successor
+        .step(at(2.1), Inputs { odometry: Some(Stamped::new(at(2.1), &moved)), ..Inputs::default() })
+        .pose;
+    assert!((pose.x_m - 2.2).hypot(pose.y_m - 1.0) < 0.1, "{pose:?}");
+    assert_eq!(pose.floor, 2);
+    assert!(pose.pose().is_ok());
+}

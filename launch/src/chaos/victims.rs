@@ -1,0 +1,311 @@
+//! The robot as chaos sees it: whom to hit, what the wheels are told, and who is back.
+
+use super::plan::{Deed, Kind, any};
+use super::witness::{Deadlines, Witness, Wound};
+use crate::graph::{Checked, CheckedService};
+use crate::supervise::{Phase, Supervisor};
+use board::JoinError;
+use board::tap::{Tap, TapPublisher, TapReader};
+use geometry::World;
+use messages::{AppliedWheels, Message as _, MissionStatus, Order, Time, View, WorldTruth};
+use rand::SeedableRng as _;
+use rand_pcg::Pcg64;
+use rustix::process::{Pid, Signal, kill_process};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+const WHEELS: &str = "wheels/applied";
+const ORDERS: &str = "mission/orders";
+/// Who said something within this time before it was hit speaks often.
+const SPEAKS_WITHIN: Duration = Duration::from_millis(300);
+/// A successor that has not spoken by then does not count as healed.
+const UNHEALED: Duration = Duration::from_secs(10);
+/// Messages may still be on their way when a deadline is over.
+const SETTLED: Duration = Duration::from_millis(100);
+
+/// What became of a wound.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Verdict {
+    pub(super) wound: Wound,
+    /// How late the wheels were told to turn.
+    pub(super) too_late: Option<Duration>,
+}
+
+#[derive(Debug)]
+struct Victim {
+    role: String,
+    in_chain: bool,
+    topics: Vec<TapReader>,
+    last_message: Option<Time>,
+}
+
+/// The robot under test.
+pub(super) struct Scene {
+    victims: Vec<Victim>,
+    deadlines: Deadlines,
+    witness: Witness,
+    wounds: Vec<Wound>,
+    wheels: Option<TapReader>,
+    truth: Option<TapReader>,
+    mission: Option<TapReader>,
+    orders: Option<TapPublisher>,
+    rooms: Vec<(i32, String)>,
+    rng: Pcg64,
+    last_order: Option<Time>,
+    status: Option<MissionStatus>,
+    way_m: f64,
+    world: Option<WorldTruth>,
+    first_contacts: Option<u64>,
+    tap: Tap,
+}
+
+impl Scene {
+    /// Looks at the graph: everybody may be hit but those who are spared, and those who are no part of the robot: its simulator and its referee.
+    pub(super) fn new(graph: &Checked, spare: &[String], mut tap: Tap, seed: u64) -> Result<Self, String> {
+        let of = |topic: &str| {
+            let topic = graph.topics.iter().find(|known| known.name == topic);
+            topic.and_then(|topic| topic.publisher.role())
+        };
+        if let Some(unknown) =
+            spare.iter().find(|role| !graph.services.iter().any(|known| known.role == **role))
+        {
+            return Err(format!("--spare {unknown}: there is no such service"));
+        }
+        let outside = [of(&graph.view.truth), graph.finish.as_deref().and_then(of)];
+        let spared = |role: &str| outside.contains(&Some(role)) || spare.iter().any(|spared| spared == role);
+        let driver = of(WHEELS);
+        // Without one of these there is no fresh GO, no fresh command, or nobody to tell the motors.
+        let in_chain = |role: &str| {
+            let needs = |topic: &&crate::graph::CheckedTopic| {
+                topic.readers.iter().any(|reader| Some(reader.role.as_str()) == driver && reader.required)
+            };
+            Some(role) == driver
+                || driver.is_some()
+                    && graph.topics.iter().filter(needs).any(|topic| topic.publisher.role() == Some(role))
+        };
+        let mut victims = Vec::new();
+        for service in graph.services.iter().filter(|service| !spared(&service.role)) {
+            let published =
+                graph.topics.iter().filter(|topic| topic.publisher.role() == Some(service.role.as_str()));
+            let topics: Result<Vec<TapReader>, JoinError> =
+                published.map(|topic| tap.reader(&topic.name)).collect();
+            victims.push(Victim {
+                role: service.role.clone(),
+                in_chain: in_chain(&service.role),
+                topics: topics.map_err(|error| error.to_string())?,
+                last_message: None,
+            });
+        }
+        if victims.is_empty() {
+            return Err("nobody is left to be hit".to_owned());
+        }
+        let world = graph.view.world.as_ref().and_then(|world| World::load(graph.folder.join(world)).ok());
+        let rooms =
+            world.iter().flat_map(|world| &world.doors).map(|door| (door.floor, door.room.clone())).collect();
+        let reader = |topic: &str| tap.reader(topic).ok();
+        let (wheels, truth, mission) =
+            (reader(WHEELS), reader(&graph.view.truth), reader(&graph.view.mission));
+        let orders = tap.publisher(ORDERS).ok();
+        Ok(Self {
+            victims,
+            deadlines: deadlines_of(
+                graph.services.iter().find(|service| Some(service.role.as_str()) == driver),
+            ),
+            witness: Witness::default(),
+            wounds: Vec::new(),
+            wheels,
+            truth,
+            mission,
+            orders,
+            rooms,
+            rng: Pcg64::seed_from_u64(seed),
+            last_order: None,
+            status: None,
+            way_m: 0.0,
+            world: None,
+            first_contacts: None,
+            tap,
+        })
+    }
+
+    /// How many may be hit.
+    pub(super) fn victims(&self) -> usize {
+        self.victims.len()
+    }
+
+    /// Their names.
+    pub(super) fn victim_roles(&self) -> Vec<String> {
+        self.victims.iter().map(|victim| victim.role.clone()).collect()
+    }
+
+    /// Does the deed; false while the victim has no process.
+    pub(super) fn hit(&mut self, supervisor: &mut Supervisor, deed: &Deed, now: Time) -> bool {
+        let Some(victim) = self.victims.get(deed.victim) else { return false };
+        let role = victim.role.clone();
+        let Some(service) = supervisor.services.iter().find(|service| service.service.role == role) else {
+            return false;
+        };
+        let (Some(pid), Some(slot)) = (service.pid(), service.slot()) else { return false };
+        // Who starts can be killed; to hang or to leave it must have begun.
+        if deed.kind != Kind::Kill && service.phase != Phase::Running {
+            return false;
+        }
+        let generation = supervisor
+            .host
+            .switchboard()
+            .slot(slot)
+            .map_or(0, |slot| slot.generation.load(Ordering::Acquire));
+        let send = |signal| {
+            if let Some(pid) = i32::try_from(pid).ok().and_then(Pid::from_raw) {
+                let _ = kill_process(pid, signal);
+            }
+        };
+        match deed.kind {
+            Kind::Kill => send(Signal::KILL),
+            Kind::Hang => send(Signal::STOP),
+            Kind::Restart => _ = supervisor.restart(&role),
+        }
+        let mut alone = true;
+        for open in self.wounds.iter_mut().filter(|wound| wound.healed.is_none()) {
+            open.overtaken |= open.role == role;
+            open.alone &= open.role == role;
+            alone &= open.role == role;
+        }
+        self.wounds.push(Wound {
+            kind: deed.kind,
+            in_start_up: deed.in_start_up,
+            at: now,
+            generation,
+            in_chain: victim.in_chain,
+            speaks: victim.last_message.is_some_and(|last| now.since(last) < SPEAKS_WITHIN),
+            died: (deed.kind == Kind::Kill).then_some(now),
+            healed: None,
+            spoke: None,
+            alone,
+            overtaken: false,
+            role,
+        });
+        true
+    }
+
+    /// Takes in what was said since the last look.
+    pub(super) fn look(&mut self, supervisor: &Supervisor, now: Time) {
+        for victim in &mut self.victims {
+            for reader in &mut victim.topics {
+                while let Some((envelope, _)) = reader.next() {
+                    let stamp = Time::from_nanos(envelope.stamp_ns);
+                    victim.last_message = victim.last_message.max(Some(stamp));
+                    let newer = |wound: &&mut Wound| {
+                        wound.role == victim.role && envelope.generation > wound.generation
+                    };
+                    for wound in self.wounds.iter_mut().filter(newer) {
+                        wound.spoke.get_or_insert(stamp);
+                    }
+                }
+            }
+        }
+        for wound in &mut self.wounds {
+            let Some(service) = supervisor.services.iter().find(|service| service.service.role == wound.role)
+            else {
+                continue;
+            };
+            let slot = service.slot().and_then(|slot| supervisor.host.switchboard().slot(slot));
+            let successor = slot.filter(|slot| slot.generation.load(Ordering::Acquire) > wound.generation);
+            if successor.is_some() || slot.is_none() {
+                wound.died.get_or_insert(now);
+            }
+            if successor.is_some_and(|slot| slot.steps.load(Ordering::Relaxed) > 0) {
+                wound.healed.get_or_insert(now);
+            }
+        }
+        while let Some((envelope, bytes)) = self.wheels.as_mut().and_then(TapReader::next) {
+            if let Ok(view) = View::<AppliedWheels>::parse(bytes) {
+                let stamp = Time::from_nanos(envelope.stamp_ns);
+                self.witness.told(stamp, view.message.left_mps, view.message.right_mps);
+            }
+        }
+        while let Some((_, bytes)) = self.truth.as_mut().and_then(TapReader::next) {
+            if let Ok(view) = View::<WorldTruth>::parse(bytes) {
+                self.first_contacts.get_or_insert(view.message.contacts);
+                let step_m = self
+                    .world
+                    .map_or(0.0, |last| (view.message.x_m - last.x_m).hypot(view.message.y_m - last.y_m));
+                // What cannot be is no way: a message of another world.
+                self.way_m += if step_m < 0.5 { step_m } else { 0.0 };
+                self.world = Some(*view.message);
+            }
+        }
+        while let Some((_, bytes)) = self.mission.as_mut().and_then(TapReader::next) {
+            self.status = View::<MissionStatus>::parse(bytes).ok().map(|view| *view.message).or(self.status);
+        }
+    }
+
+    /// Orders another coffee when none waits: a robot that stands still proves nothing.
+    pub(super) fn keep_it_busy(&mut self, now: Time) {
+        // A reader that has joined anew gets the last message from whoever published it.
+        self.tap.wait(self.tap.bell().wrapping_sub(1), Duration::ZERO);
+        let (Some(orders), Some(status), Some(world)) = (&self.orders, &self.status, &self.world) else {
+            return;
+        };
+        if status.waiting > 0 || self.last_order.is_some_and(|last| now.since(last) < Duration::from_secs(2))
+        {
+            return;
+        }
+        let here: Vec<&String> =
+            self.rooms.iter().filter(|(floor, _)| *floor == world.floor).map(|(_, room)| room).collect();
+        let Some(room) = any(&mut self.rng, &here) else { return };
+        let order = serde_json::json!({ "room": room });
+        if let Ok(bytes) = Order::description().from_json(&order) {
+            let _ = orders.publish(&bytes);
+            self.last_order = Some(now);
+        }
+    }
+
+    /// The wounds about which all is known.
+    pub(super) fn close_wounds(&mut self, now: Time) -> Vec<Verdict> {
+        let settled = |wound: &Wound| {
+            let judged = now.since(wound.at) > self.deadlines.told + SETTLED;
+            // Who had something to say before may have none now: a door that was passed.
+            let spoke = wound.spoke.is_some() || !wound.speaks;
+            judged && wound.healed.is_some() && spoke || now.since(wound.at) > UNHEALED
+        };
+        let (closed, open) = std::mem::take(&mut self.wounds).into_iter().partition(settled);
+        self.wounds = open;
+        let verdict =
+            |wound: Wound| Verdict { too_late: self.witness.too_late(&wound, self.deadlines), wound };
+        Vec::into_iter(closed).map(verdict).collect()
+    }
+
+    /// Whether something is still to be seen.
+    pub(super) fn has_open_wounds(&self) -> bool {
+        !self.wounds.is_empty()
+    }
+
+    /// Those who have not come back.
+    pub(super) fn give_up(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.wounds).into_iter().map(|wound| wound.role).collect()
+    }
+
+    /// How often the robot has touched something.
+    pub(super) fn contacts(&self) -> Option<u64> {
+        Some(self.world?.contacts.saturating_sub(self.first_contacts?))
+    }
+
+    /// How far the robot went.
+    pub(super) fn way_m(&self) -> Option<f64> {
+        self.world.map(|_| self.way_m)
+    }
+
+    /// Coffees delivered.
+    pub(super) fn deliveries(&self) -> Option<u64> {
+        self.status.map(|status| status.delivered)
+    }
+}
+
+/// From the parameters of the base driver, or what is usual.
+fn deadlines_of(driver: Option<&CheckedService>) -> Deadlines {
+    let parameter = |name: &str| driver.and_then(|driver| driver.parameters.get(name)?.as_u64());
+    let deadline = parameter("guard_deadline_ms").max(parameter("command_deadline_ms")).unwrap_or(100);
+    let period = parameter("period_ms").unwrap_or(20);
+    Deadlines { told: Duration::from_millis(deadline + period) }
+}

@@ -1,0 +1,22 @@
+//! The process around `sampling_planner`.
+use messages::{Path, PlanRequest, PoseEstimate, TofRanges};
+use sampling_planner::{Inputs, Params, SamplingPlanner};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    board::run(board::about!(), |node, params: Params| {
+        let mut request = node.reference::<PlanRequest>("plan/request")?;
+        let mut pose = node.latest::<PoseEstimate>("location/pose")?;
+        let mut ranges = node.optional::<TofRanges>("tof/ranges")?;
+        let mut path = node.publisher::<Path>("plan/path")?;
+        node.wake_on(&request);
+        node.every(params.period());
+        let mut planner = SamplingPlanner::new(params, node.seed())?;
+        Ok(move |now| {
+            let inputs = Inputs { request: request.read(), pose: pose.read(), ranges: ranges.read() };
+            if let Some((header, waypoints)) = planner.step(now, inputs).path {
+                path.publish_with(&header, waypoints);
+            }
+        })
+    })
+}
