@@ -1,6 +1,6 @@
 //! What the robot may touch: the walls of the map, or what a scan has shown of them.
 
-use geometry::{Point2, Polygon, Pose2, Scene, Segment, Walls, World, angle};
+use geometry::{Point2, Polygon, Pose2, Scene, Segment, Walls, World};
 use messages::RangeScan;
 
 /// Turns are looked at in steps of this.
@@ -131,41 +131,54 @@ const RAD_PER_M: f64 = 30.0;
 /// Smaller turns are none.
 const NO_TURN_RAD: f64 = 0.004;
 
-impl Arena {
-    /// The cheapest way to look along what `wanted_rad` says for a place, in the map, with room for the body; the roomiest where there is
-    /// not enough. Either way around is tried.
-    pub(crate) fn manoeuvre(
-        &self,
-        pose: Pose2,
-        margin_m: f64,
-        wanted_rad: impl Fn(Point2<f64>) -> f64,
-    ) -> Manoeuvre {
-        let options = FIRST_M.into_iter().flat_map(|first_m| {
-            let from = pose.compose(Pose2::new(first_m, 0.0, 0.0));
-            let short_rad = angle::difference(wanted_rad(from.position()), pose.heading_rad);
-            let long_rad = short_rad - std::f64::consts::TAU.copysign(short_rad);
-            [(first_m, from, short_rad), (first_m, from, long_rad)]
-        });
-        let mut best: Option<(f64, Manoeuvre)> = None;
-        for (first_m, from, turn_rad) in options {
-            let cost = first_m.abs() * RAD_PER_M + turn_rad.abs();
-            let enough = |(_, found): &(f64, Manoeuvre)| found.room_m >= margin_m;
-            if best.as_ref().is_some_and(|best| enough(best) && best.0 <= cost) {
-                continue;
-            }
-            let turn_rad = if turn_rad.abs() < NO_TURN_RAD { 0.0 } else { turn_rad };
-            let way_room_m = if first_m == 0.0 { f64::INFINITY } else { self.driving_room_m(pose, first_m) };
-            let turn_room_m = if turn_rad == 0.0 { f64::INFINITY } else { self.turning_room_m(from, turn_rad) };
-            let found = (cost, Manoeuvre { first_m, turn_rad, room_m: way_room_m.min(turn_room_m) });
-            let better = match &best {
-                None => true,
-                Some(best) if enough(best) => enough(&found),
-                Some(best) => found.1.room_m > best.1.room_m,
-            };
-            if better {
-                best = Some(found);
-            }
+/// What the robot knows of its surroundings, and where it is in them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct View<'a> {
+    pub(crate) arena: &'a Arena,
+    pub(crate) pose: Pose2,
+}
+
+/// The least room that any view shows around the body while it turns.
+pub(crate) fn turning_room_m(views: &[View<'_>], ahead_m: f64, turn_rad: f64) -> f64 {
+    let room_m = |view: &View<'_>| {
+        view.arena.turning_room_m(view.pose.compose(Pose2::new(ahead_m, 0.0, 0.0)), turn_rad)
+    };
+    views.iter().map(room_m).fold(f64::INFINITY, f64::min)
+}
+
+/// The same while it drives straight.
+pub(crate) fn driving_room_m(views: &[View<'_>], way_m: f64) -> f64 {
+    views.iter().map(|view| view.arena.driving_room_m(view.pose, way_m)).fold(f64::INFINITY, f64::min)
+}
+
+/// The cheapest way to look at a place, given as seen from the robot, with room for the body in all views; the roomiest where there is not
+/// enough. Either way around is tried.
+pub(crate) fn manoeuvre(views: &[View<'_>], margin_m: f64, place: Point2<f64>) -> Manoeuvre {
+    let options = FIRST_M.into_iter().flat_map(|first_m| {
+        let short_rad = place.y.atan2(place.x - first_m);
+        let long_rad = short_rad - std::f64::consts::TAU.copysign(short_rad);
+        [(first_m, short_rad), (first_m, long_rad)]
+    });
+    let mut best: Option<(f64, Manoeuvre)> = None;
+    for (first_m, turn_rad) in options {
+        let cost = first_m.abs() * RAD_PER_M + turn_rad.abs();
+        let enough = |(_, found): &(f64, Manoeuvre)| found.room_m >= margin_m;
+        if best.as_ref().is_some_and(|best| enough(best) && best.0 <= cost) {
+            continue;
         }
-        best.map_or(Manoeuvre { first_m: 0.0, turn_rad: 0.0, room_m: 0.0 }, |(_, found)| found)
+        let turn_rad = if turn_rad.abs() < NO_TURN_RAD { 0.0 } else { turn_rad };
+        let way_room_m = if first_m == 0.0 { f64::INFINITY } else { driving_room_m(views, first_m) };
+        let turn_room_m =
+            if turn_rad == 0.0 { f64::INFINITY } else { turning_room_m(views, first_m, turn_rad) };
+        let found = (cost, Manoeuvre { first_m, turn_rad, room_m: way_room_m.min(turn_room_m) });
+        let better = match &best {
+            None => true,
+            Some(best) if enough(best) => enough(&found),
+            Some(best) => found.1.room_m > best.1.room_m,
+        };
+        if better {
+            best = Some(found);
+        }
     }
+    best.map_or(Manoeuvre { first_m: 0.0, turn_rad: 0.0, room_m: 0.0 }, |(_, found)| found)
 }

@@ -1,6 +1,7 @@
 //! What comes next: the flow of Fig. 8 (NXT-095), one task after the other.
 
-use crate::{Belief, Executive, Inputs, arena::Manoeuvre, resolve};
+use crate::arena::{Manoeuvre, View, driving_room_m, manoeuvre, turning_room_m};
+use crate::{Executive, Inputs, resolve};
 use geometry::{Point2, Pose2, angle};
 use messages::{
     FixedText, JourneyStageName, MotionCommand, MotionKindName, MotionStateName, PlanRequest,
@@ -66,6 +67,12 @@ const NO_TURN_RAD: f64 = 0.03;
 const REACHED_M: f64 = 0.004;
 /// Ways to tell places apart are looked for along the belief's best place; they may be so wrong.
 const STEP_M: f64 = 0.02;
+/// A way shorter than this leads nowhere.
+const NO_WAY_M: f64 = 0.03;
+/// A scan is worth looking at while the robot is no farther from where it was taken.
+const SEEN_REACH_M: f64 = 0.05;
+/// Farther away a scan shows walls nearer than they are, as its cones are wide.
+const SEEN_WAY_M: f64 = 0.15;
 
 impl Executive {
     /// Goes on to the next task if the present one is done. Returns whether it was.
@@ -163,12 +170,11 @@ impl Executive {
         // To the wall itself if possible, then the smallest.
         let faces_first = range_m >= self.params.face_wall_from_m;
         turns[usize::from(faces_first)..].sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-        let room_m = |turn_rad: f64| {
-            let scan = self.seen.as_ref().map_or(0.0, |(_, seen)| seen.turning_room_m(Pose2::IDENTITY, turn_rad));
-            let map = self.place().map(|belief| self.arena.turning_room_m(belief.pose, turn_rad));
-            map.unwrap_or(scan)
+        self.seen_at = self.belief.map_or(Pose2::IDENTITY, |belief| belief.pose);
+        let has_room = |turn_rad: &f64| {
+            turning_room_m(&self.views(), 0.0, *turn_rad) >= self.params.turn_margin_m
         };
-        match turns.into_iter().find(|turn_rad| room_m(*turn_rad) >= self.params.turn_margin_m) {
+        match turns.into_iter().find(has_room) {
             Some(turn_rad) => {
                 let window_rad = angle::difference(bearing_rad, turn_rad);
                 self.only_localising = true;
@@ -198,6 +204,7 @@ impl Executive {
             return self.keep(now, Task::Locating { scans, since });
         }
         self.only_localising = false;
+        self.seen_at = self.belief.map_or(Pose2::IDENTITY, |belief| belief.pose);
         if self.place().is_none() {
             self.count.ambiguous += 1;
             return self.resolve(now);
@@ -337,23 +344,31 @@ impl Executive {
                         continue;
                     }
                     let Manoeuvre { first_m, turn_rad, .. } = self.turn_to(belief.pose, place);
-                    if first_m != 0.0 {
+                    if first_m != 0.0 || turn_rad != 0.0 {
                         rest.push_front(motion);
-                        self.order(MotionKindName::Move, first_m);
-                    } else if turn_rad != 0.0 {
-                        rest.push_front(motion);
-                        self.order(MotionKindName::Turn, turn_rad);
+                        if first_m != 0.0 {
+                            self.order(MotionKindName::Move, first_m);
+                        } else {
+                            self.order(MotionKindName::Turn, turn_rad);
+                        }
                     } else {
                         let certain_m = if stage == JourneyStageName::Driving {
                             self.certain_way_m(belief.pose, place, belief.sigma_m, belief.sigma_rad)
                         } else {
-                            f64::INFINITY
+                            self.seen_way_m(left_m)
                         };
                         if certain_m < left_m - REACHED_M {
                             rest.clear();
                             then = Then::Survey;
                         }
-                        self.order(MotionKindName::Move, left_m.min(certain_m));
+                        if certain_m < NO_WAY_M
+                            && let Some((turn_rad, way_m)) = self.open_space()
+                        {
+                            rest.push_front(Motion::Move(way_m));
+                            self.order(MotionKindName::Turn, turn_rad);
+                        } else {
+                            self.order(MotionKindName::Move, left_m.min(certain_m));
+                        }
                     }
                 }
             }
@@ -370,14 +385,37 @@ impl Executive {
         }
     }
 
-    /// What it takes to look at a place, from wherever the robot then is.
+    /// What the robot knows of its surroundings: the map where the place is certain, and the last scan while it is near where it was taken.
+    fn views(&self) -> Vec<View<'_>> {
+        let map = self.place().map(|belief| View { arena: &self.arena, pose: belief.pose });
+        let now = self.belief.map_or(Pose2::IDENTITY, |belief| belief.pose);
+        let moved = self.seen_at.to(now);
+        let is_near = moved.x_m.hypot(moved.y_m) <= SEEN_REACH_M;
+        let scan = self.seen.as_ref().filter(|_| is_near || map.is_none());
+        map.into_iter().chain(scan.map(|(_, arena)| View { arena, pose: moved })).collect()
+    }
+
+    /// What it takes to look at a place.
     fn turn_to(&self, pose: Pose2, place: Point2<f64>) -> Manoeuvre {
-        let heading_rad = |from: Point2<f64>| (place.y - from.y).atan2(place.x - from.x);
-        let askew_rad = angle::difference(heading_rad(pose.position()), pose.heading_rad);
-        if askew_rad.abs() < self.params.heading_tolerance_rad {
+        let seen = pose.inverse_transform(place);
+        if seen.y.atan2(seen.x).abs() < self.params.heading_tolerance_rad {
             return Manoeuvre { first_m: 0.0, turn_rad: 0.0, room_m: f64::INFINITY };
         }
-        self.arena.manoeuvre(pose, self.params.turn_margin_m, heading_rad)
+        manoeuvre(&self.views(), self.params.turn_margin_m, seen)
+    }
+
+    /// How far the robot may drive by what it has seen; beyond a short way it relies on the guard.
+    fn seen_way_m(&self, way_m: f64) -> f64 {
+        let views = self.views();
+        let most_m = way_m.min(SEEN_WAY_M);
+        let steps = (most_m / STEP_M).ceil().max(1.0) as u32;
+        for step in 1..=steps {
+            let to_m = most_m * f64::from(step) / f64::from(steps);
+            if driving_room_m(&views, to_m) < self.params.way_margin_m {
+                return (to_m - STEP_M).max(0.0);
+            }
+        }
+        f64::INFINITY
     }
 
     /// How far the robot may drive before the error of its pose could bring it too near to a wall.
@@ -407,8 +445,9 @@ impl Executive {
         let is_way = kind == MotionKindName::Move;
         let most_m = self.params.retreat_m;
         // The way that it has driven is free as well; the controller adds it.
-        let behind_m = |belief: Belief| self.arena.retreat_m(belief.pose, most_m, self.params.turn_margin_m);
-        let retreat_m = self.belief.map_or(most_m, behind_m);
+        let margin_m = self.params.turn_margin_m;
+        let behind_m = |view: &View<'_>| view.arena.retreat_m(view.pose, most_m, margin_m);
+        let retreat_m = self.views().iter().map(behind_m).fold(most_m, f64::min);
         self.motion = MotionCommand {
             command_id: self.next_id(),
             distance_m: if is_way { amount } else { 0.0 },

@@ -66,6 +66,8 @@ pub struct Executive {
     belief: Option<Belief>,
     /// What the newest scan has shown, in the frame of the robot then.
     seen: Option<(Time, Arena)>,
+    /// The belief's pose when that scan was weighed.
+    seen_at: Pose2,
     places: Vec<resolve::Hypothesis>,
     cloud_stamp: Option<Time>,
     /// Since when the robot waits for another service.
@@ -129,6 +131,7 @@ impl Executive {
             task: Task::Waiting,
             belief: None,
             seen: None,
+            seen_at: Pose2::IDENTITY,
             places: Vec::new(),
             cloud_stamp: None,
             waits_since: None,
