@@ -1,6 +1,6 @@
 //! What the robot may touch: the walls of the map, or what a scan has shown of them.
 
-use geometry::{Point2, Polygon, Pose2, Scene, Segment, Walls, World};
+use geometry::{Point2, Polygon, Pose2, Scene, Segment, Vector2, Walls, World};
 use messages::RangeScan;
 
 /// Turns are looked at in steps of this.
@@ -97,6 +97,28 @@ impl Arena {
         self.walls().distance_m(place)
     }
 
+    /// A place near this one, at most `shift_m` away, that is `clearance_m` from the walls, or as far as it gets.
+    pub(crate) fn shifted(&self, place: Point2<f64>, clearance_m: f64, shift_m: f64) -> Point2<f64> {
+        let around = (1..=4).flat_map(|ring| {
+            (0..16).map(move |step| {
+                let (sine, cosine) = (f64::from(step) / 16.0 * std::f64::consts::TAU).sin_cos();
+                Vector2::new(cosine, sine) * (f64::from(ring) / 4.0)
+            })
+        });
+        let mut best = (place, self.free_m(place));
+        for offset in around {
+            let other = place + offset * shift_m;
+            let free_m = self.free_m(other);
+            if best.1 >= clearance_m {
+                break;
+            }
+            if free_m > best.1 + 1e-6 {
+                best = (other, free_m);
+            }
+        }
+        best.0
+    }
+
     /// How far the robot can drive back, up to `most_m`, with `margin_m` left.
     pub(crate) fn retreat_m(&self, pose: Pose2, most_m: f64, margin_m: f64) -> f64 {
         let steps = (most_m / WAY_STEP_M).ceil().max(1.0) as u32;
@@ -181,4 +203,53 @@ pub(crate) fn manoeuvre(views: &[View<'_>], margin_m: f64, place: Point2<f64>) -
         }
     }
     best.map_or(Manoeuvre { first_m: 0.0, turn_rad: 0.0, room_m: 0.0 }, |(_, found)| found)
+}
+
+/// Where an approach may begin: so far from its end, in so many directions.
+const APPROACH_M: [f64; 4] = [0.06, 0.10, 0.14, 0.20];
+const APPROACHES: u32 = 24;
+/// An approach begins where the robot can turn as it likes.
+const APPROACH_ROOM_M: f64 = 0.125;
+/// A turn more has to be worth its error.
+const VIA_COST_M: f64 = 0.05;
+
+impl Arena {
+    /// The least room on the straight way to a place, the turn to it included.
+    fn way_room_m(&self, pose: Pose2, place: Point2<f64>, margin_m: f64) -> (f64, Pose2) {
+        let views = [View { arena: self, pose }];
+        let turn = manoeuvre(&views, margin_m, pose.inverse_transform(place));
+        let from = pose.compose(Pose2::new(turn.first_m, 0.0, turn.turn_rad));
+        let way_m = (place - from.position()).norm();
+        let there = from.compose(Pose2::new(way_m, 0.0, 0.0));
+        (turn.room_m.min(self.driving_room_m(from, way_m)), there)
+    }
+
+    /// By way of which place the body best gets to a last one: `None` for the straight way. A box that drives up to a wall askew touches it
+    /// with a corner where one that drives along it, or straight at it, does not.
+    pub(crate) fn approach(&self, pose: Pose2, place: Point2<f64>, margin_m: f64) -> Option<Point2<f64>> {
+        let (direct_room_m, _) = self.way_room_m(pose, place, margin_m);
+        if direct_room_m >= margin_m {
+            return None;
+        }
+        let mut best = (direct_room_m.min(margin_m), (place - pose.position()).norm(), None);
+        for (reach_m, step) in APPROACH_M.into_iter().flat_map(|reach_m| (0..APPROACHES).map(move |step| (reach_m, step))) {
+            let heading_rad = f64::from(step) / f64::from(APPROACHES) * std::f64::consts::TAU;
+            let begin = Pose2::new(place.x, place.y, heading_rad).compose(Pose2::new(-reach_m, 0.0, 0.0));
+            if self.free_m(begin.position()) < APPROACH_ROOM_M {
+                continue;
+            }
+            let last_room_m = self.driving_room_m(begin, reach_m);
+            if last_room_m <= best.0 && best.0 < margin_m {
+                continue;
+            }
+            let (first_room_m, there) = self.way_room_m(pose, begin.position(), margin_m);
+            let (second_room_m, _) = self.way_room_m(there, place, margin_m);
+            let room_m = last_room_m.min(first_room_m).min(second_room_m).min(margin_m);
+            let cost_m = (begin.position() - pose.position()).norm() + reach_m + VIA_COST_M;
+            if room_m > best.0 || (room_m == best.0 && cost_m < best.1) {
+                best = (room_m, cost_m, Some(begin.position()));
+            }
+        }
+        best.2
+    }
 }

@@ -36,6 +36,8 @@ pub(crate) enum Motion {
     Move(f64),
     /// Turns to a place of the map and drives there, as far as the certainty of the pose allows.
     Towards(Point2<f64>),
+    /// The same to the end of the path, by way of another place where the body needs that.
+    Approach(Point2<f64>),
 }
 
 /// What follows motions.
@@ -286,13 +288,18 @@ impl Executive {
         let is_finite = |place: &Point2<f64>| place.x.is_finite() && place.y.is_finite();
         let places = path.elements.iter().map(|waypoint| Point2::new(waypoint.x_m, waypoint.y_m));
         let mut rest: VecDeque<Motion> = places.filter(is_finite).skip(1).map(Motion::Towards).collect();
-        if let Some(target) = self.target {
-            // Whatever the planner rounds, the target itself is meant.
-            rest.pop_back();
-            rest.push_back(Motion::Towards(target));
-        }
+        // Whatever the planner rounds, the aim itself is meant.
+        rest.pop_back();
+        rest.push_back(Motion::Approach(self.aim(path.elements)));
         self.task = Task::Moving { stage: JourneyStageName::Driving, rest, then: Then::Arrive };
         self.begin(now)
+    }
+
+    /// Where the robot tries to arrive: at the target, or a little farther from the walls.
+    fn aim(&self, path: &[messages::Waypoint]) -> Point2<f64> {
+        let end = path.last().map_or(Point2::origin(), |end| Point2::new(end.x_m, end.y_m));
+        let target = self.target.unwrap_or(end);
+        self.arena.shifted(target, self.params.aim_clearance_m, self.params.aim_shift_m)
     }
 
     /// Begins the first of the motions.
@@ -337,6 +344,15 @@ impl Executive {
             match motion {
                 Motion::Turn(turn_rad) => self.order(MotionKindName::Turn, turn_rad),
                 Motion::Move(way_m) => self.order(MotionKindName::Move, way_m),
+                Motion::Approach(place) => {
+                    let Some(belief) = self.belief else { return self.survey(now) };
+                    rest.push_front(Motion::Towards(place));
+                    let via = self.arena.approach(belief.pose, place, self.params.approach_margin_m);
+                    if let Some(via) = via {
+                        rest.push_front(Motion::Towards(via));
+                    }
+                    continue;
+                }
                 Motion::Towards(place) => {
                     let Some(belief) = self.belief else { return self.survey(now) };
                     let left_m = (place - belief.pose.position()).norm();

@@ -18,6 +18,12 @@ pub struct Params {
     /// No nearer to a wall does a random target lie.
     #[schemars(range(min = 0.0, max = 2.0))]
     pub target_clearance_m: f64,
+    /// A target that is nearer to a wall is taken for a place that is so far away from it: the body could touch the wall as it arrives.
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub aim_clearance_m: f64,
+    /// But no farther than this from the target itself.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub aim_shift_m: f64,
     /// A robot that believes to be so near is there (NXT-096).
     #[schemars(range(min = 0.001, max = 1.0))]
     pub close_enough_m: f64,
@@ -36,6 +42,9 @@ pub struct Params {
     /// Room that is kept around the body when it turns.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub turn_margin_m: f64,
+    /// Room that is wanted around the body as it comes to the target.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub approach_margin_m: f64,
     /// Room beside the body that a way must keep, however wrong the pose may be.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub way_margin_m: f64,
@@ -78,12 +87,15 @@ impl Default for Params {
             target: "target".to_owned(),
             random_target: false,
             target_clearance_m: 0.10,
+            aim_clearance_m: 0.112,
+            aim_shift_m: 0.012,
             close_enough_m: 0.02,
             max_rounds: 3,
             max_scans: 60,
             body_length_m: 0.16,
             body_width_m: 0.14,
             turn_margin_m: 0.012,
+            approach_margin_m: 0.015,
             way_margin_m: 0.005,
             way_sigmas: 2.0,
             shortest_way_m: 0.15,
@@ -92,7 +104,7 @@ impl Default for Params {
             face_wall_from_m: 0.13,
             retreat_m: 0.10,
             open_space_m: 0.10,
-            goal_tolerance_m: 0.005,
+            goal_tolerance_m: 0.03,
             patience_s: 4.0,
             period_ms: 50,
         }
@@ -148,12 +160,15 @@ impl messages::Parameters for Params {
     fn check(&self) -> Result<(), ParamsError> {
         let ranges = [
             ("target_clearance_m", self.target_clearance_m, 0.0, 2.0),
+            ("aim_clearance_m", self.aim_clearance_m, 0.0, 2.0),
+            ("aim_shift_m", self.aim_shift_m, 0.0, 1.0),
             ("close_enough_m", self.close_enough_m, 0.001, 1.0),
             ("max_rounds", self.max_rounds.into(), 1.0, 100.0),
             ("max_scans", self.max_scans.into(), 2.0, 10_000.0),
             ("body_length_m", self.body_length_m, 0.02, 2.0),
             ("body_width_m", self.body_width_m, 0.02, 2.0),
             ("turn_margin_m", self.turn_margin_m, 0.0, 0.5),
+            ("approach_margin_m", self.approach_margin_m, 0.0, 0.5),
             ("way_margin_m", self.way_margin_m, 0.0, 0.5),
             ("way_sigmas", self.way_sigmas, 0.0, 6.0),
             ("shortest_way_m", self.shortest_way_m, 0.01, 2.0),

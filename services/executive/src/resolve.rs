@@ -24,11 +24,11 @@ const PLACES: usize = 90;
 /// No place is farther away.
 const REACH_M: f64 = 1.3;
 /// Places keep this distance from walls at the likeliest pose, so that the robot can turn there.
-const ROOM_M: f64 = 0.125;
+const ROOM_M: f64 = 0.13;
 /// Ways keep this distance at the likeliest pose, and at the others.
-const BESIDE_M: [f64; 2] = [0.10, 0.085];
+const BESIDE_M: [f64; 2] = [0.11, 0.105];
 /// A way must be free at poses of this weight.
-const FREE_WEIGHT: f64 = 0.85;
+const FREE_WEIGHT: f64 = 0.9;
 /// Standard deviation of what can be told apart.
 const SIGMA_M: f64 = 0.03;
 /// No reading reaches farther.

@@ -69,9 +69,12 @@ pub struct Params {
     /// The sensor counts whole steps of this; 0 for none.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub resolution_m: f64,
-    /// The standard deviation grows by this many times the squared tangent of the angle of incidence (NXT-034).
+    /// Weak echoes are noticed late: by so many times `sigma_m` and the squared tangent of the angle of incidence (NXT-034) ...
     #[schemars(range(min = 0.0, max = 100.0))]
     pub incidence_growth: f64,
+    /// ... but by no more than this.
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub latest_m: f64,
     /// From this angle of incidence on echoes begin to be lost.
     #[schemars(range(min = 0.0, max = 89.0))]
     pub lost_from_deg: f64,
@@ -103,6 +106,7 @@ impl Default for Params {
             sigma_m: 0.01,
             resolution_m: 0.01,
             incidence_growth: 3.0,
+            latest_m: 0.30,
             lost_from_deg: 25.0,
             lost_to_deg: 60.0,
             lost_share: 0.6,
@@ -179,6 +183,7 @@ impl messages::Parameters for Params {
             ("sigma_m", self.sigma_m, 0.0, 0.2),
             ("resolution_m", self.resolution_m, 0.0, 0.1),
             ("incidence_growth", self.incidence_growth, 0.0, 100.0),
+            ("latest_m", self.latest_m, 0.0, 2.0),
             ("lost_from_deg", self.lost_from_deg, 0.0, 89.0),
             ("lost_to_deg", self.lost_to_deg, 1.0, 90.0),
             ("lost_share", self.lost_share, 0.0, 1.0),

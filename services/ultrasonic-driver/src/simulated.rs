@@ -62,7 +62,7 @@ impl SimulatedSonar {
             }
             NoiseProfile::Paper => {
                 let nearest = self.nearest(scene, sensor);
-                let range_m = nearest.and_then(|(hit, ray)| self.echo(scene, hit, &ray, noise[0], lost, late));
+                let range_m = nearest.and_then(|(hit, ray)| self.echo(scene, hit, &ray, noise, lost, late));
                 self.limited(range_m)
             }
         }
@@ -81,7 +81,7 @@ impl SimulatedSonar {
 
     /// What is heard of an echo: errors grow with the angle of incidence, until the sound does not come back at all, or by way of another
     /// wall (NXT-033, NXT-034).
-    fn echo(&self, scene: &Scene, hit: Hit, ray: &Ray, noise: f64, lost: f64, late: f64) -> Option<f64> {
+    fn echo(&self, scene: &Scene, hit: Hit, ray: &Ray, noise: [f64; 2], lost: f64, late: f64) -> Option<f64> {
         let params = &self.params;
         let incidence_rad = hit.incidence_rad();
         let (from_deg, to_deg) = (params.lost_from_deg, params.lost_to_deg);
@@ -94,10 +94,10 @@ impl SimulatedSonar {
         } else {
             0.0
         };
-        let tangent = incidence_rad.tan().min(10.0);
-        let sigma_m = params.sigma_m * (1.0 + params.incidence_growth * tangent * tangent);
-        // The sound cannot come back before it was there.
-        Some((hit.range_m + detour_m + sigma_m * noise).max(0.0))
+        // The sound cannot come back before it was there: weak echoes are only ever late.
+        let tangent = incidence_rad.tan().min(100.0);
+        let weak_m = params.sigma_m * params.incidence_growth * tangent * tangent * noise[1].abs();
+        Some((hit.range_m + detour_m + weak_m.min(params.latest_m) + params.sigma_m * noise[0]).max(0.0))
     }
 
     /// Whole steps between the least and the largest range.
