@@ -144,6 +144,18 @@ impl Polygon {
         inside
     }
 
+    /// A random place inside, at least `clearance_m` from the boundary, by numbers of the caller's that are uniform in [0, 1); `None` where
+    /// there is none, or next to none.
+    pub fn random_place(&self, clearance_m: f64, mut uniform: impl FnMut() -> f64) -> Option<Point2<f64>> {
+        const TRIES: usize = 10_000;
+        let (low, high) = self.bounds();
+        (0..TRIES).find_map(|_| {
+            let share = Vector2::new(uniform(), uniform());
+            let point = low + (high - low).component_mul(&share);
+            (self.contains(point) && self.distance_to_boundary_m(point) >= clearance_m).then_some(point)
+        })
+    }
+
     /// Distance from `point` to the nearest edge in metres, inside as well as outside.
     pub fn distance_to_boundary_m(&self, point: Point2<f64>) -> f64 {
         self.edges().map(|edge| edge.distance_m(point)).fold(f64::INFINITY, f64::min)

@@ -115,7 +115,8 @@ impl TofRanges {
     }
 }
 
-/// A scan of a laser or of a turning sensor: the header, then one range per beam. Published on `laser/scan`.
+/// A scan of a laser or of a turning sensor: the header, then one range per beam. Published on `laser/scan`, by `ultrasonic-driver` on
+/// `sonar/raw`, and by `scan-conditioner` on `sonar/scan`.
 ///
 /// Beam `i` looks along `sensor_heading_rad + angle_min_rad + i * angle_step_rad` in the robot's frame. A range that is zero, not
 /// finite or not below `range_max_m` is no reading.

@@ -141,9 +141,9 @@ impl Map {
         Stream::new(seed, epoch, if is_start { Purpose::Start } else { Purpose::Scatter })
     }
 
-    /// Reads the map that the parameters name: a world when it ends in `.toml`, else a map of the kind of ROS.
+    /// Reads the world or the map that the parameters name: a map is a world when it ends in `.toml`, else of the kind of ROS.
     pub fn load(params: &Params) -> Result<Self, MapLoadError> {
-        let file = params.map.as_str();
+        let file = if params.world.is_empty() { params.map.as_str() } else { params.world.as_str() };
         if file.is_empty() {
             return Ok(Self::empty());
         }

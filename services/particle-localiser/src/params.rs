@@ -131,6 +131,8 @@ fn start_sigma_rad() -> f64 {
 pub struct Params {
     /// Map of the kind of ROS (the YAML file), or a world file (`.toml`); empty for none, and then no pose is ever found.
     pub map: String,
+    /// World file used instead of a map; empty for none.
+    pub world: String,
     /// The floor of a world file.
     pub floor: i32,
     /// Side of a cell where a world file's walls are drawn into a grid.
@@ -248,6 +250,7 @@ impl Default for Params {
     fn default() -> Self {
         Self {
             map: String::new(),
+            world: String::new(),
             floor: 0,
             world_resolution_m: 0.05,
             occupied_percent: 65,

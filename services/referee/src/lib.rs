@@ -1,19 +1,25 @@
 //! Judges a run against the truth and says at any time how it stands: a delivery by contacts, clearance and where the robot halts
-//! (COF-004, COF-104), a localisation by its errors against a log with ground truth.
+//! (COF-004, COF-104), a localisation by its errors against a log with ground truth, the way to a target in an arena by the columns of
+//! Table I of the ultrasonic robot (NXT-102 to NXT-104).
 
+mod arena;
 mod delivery;
 mod errors;
 mod params;
+mod shortest;
 
 #[cfg(test)]
 mod tests;
 
 pub use params::{Mode, Params, ParamsError};
 
+pub use shortest::shortest_m;
+
+use arena::ArenaRun;
 use delivery::{Delivery, Ruling};
 use geometry::{Point2, World};
 use messages::{
-    AppliedWheels, Clearance, FixedText, MissionStatus, Parameters, PoseEstimate, RunState, RunSummary,
+    AppliedWheels, Clearance, FixedText, JourneyStatus, MissionStatus, Parameters, PoseEstimate, RunState, RunSummary,
     Stamped, Time, TruePose, WorldTruth,
 };
 
@@ -27,6 +33,8 @@ pub struct Inputs<'a> {
     pub truth: Option<Stamped<'a, WorldTruth>>,
     /// The newest of `mission/status`.
     pub mission: Option<Stamped<'a, MissionStatus>>,
+    /// The newest of `journey/status`.
+    pub journey: Option<Stamped<'a, JourneyStatus>>,
     /// The newest of `location/pose`.
     pub location: Option<Stamped<'a, PoseEstimate>>,
     /// The newest of `wheels/applied`.
@@ -49,6 +57,7 @@ pub struct Outputs {
 pub struct Referee {
     params: Params,
     run: Delivery,
+    arena: ArenaRun,
     log_ended: Option<Time>,
     verdict: Option<RunSummary>,
     next: Option<Time>,
@@ -71,8 +80,9 @@ impl Referee {
     /// When the parameters make no sense.
     pub fn in_world(params: Params, world: World) -> Result<Self, ParamsError> {
         params.check()?;
+        let arena = ArenaRun::new(&params, &world);
         let run = Delivery::new(&params, world);
-        Ok(Self { params, run, log_ended: None, verdict: None, next: None })
+        Ok(Self { params, run, arena, log_ended: None, verdict: None, next: None })
     }
 
     /// Looks, and says how the run stands. A verdict is final.
@@ -81,6 +91,7 @@ impl Referee {
             let (state, remark) = match self.params.mode {
                 Mode::Delivery => self.run.look(&self.params, now, &inputs),
                 Mode::Localisation => self.follow_log(now, &inputs),
+                Mode::Arena => self.arena.look(&self.params, now, &inputs),
             };
             if state != RunState::Running {
                 let summary = self.summary(state, &remark);
@@ -143,6 +154,7 @@ impl Referee {
         let comparison = &self.run.comparison;
         match self.params.mode {
             Mode::Delivery => self.run.write(&mut summary),
+            Mode::Arena => self.arena.write(&mut summary),
             Mode::Localisation => {
                 summary.push("poses compared", comparison.errors.count as f64, "");
                 summary.push("error, median", comparison.errors.quantile_m(0.5), "m");

@@ -1,5 +1,7 @@
 //! The process around `referee`.
-use messages::{AppliedWheels, Clearance, MissionStatus, PoseEstimate, RunSummary, TruePose, WorldTruth};
+use messages::{
+    AppliedWheels, Clearance, JourneyStatus, MissionStatus, PoseEstimate, RunSummary, TruePose, WorldTruth,
+};
 use referee::{Inputs, Mode, Params, Referee};
 use std::process::ExitCode;
 
@@ -7,6 +9,7 @@ fn main() -> ExitCode {
     board::run(board::about!(), |node, params: Params| {
         let mut truth = node.optional::<WorldTruth>("world/truth")?;
         let mut mission = node.optional_reference::<MissionStatus>("mission/status")?;
+        let mut journey = node.optional_reference::<JourneyStatus>("journey/status")?;
         let mut location = node.optional::<PoseEstimate>("location/pose")?;
         let mut applied = node.optional::<AppliedWheels>("wheels/applied")?;
         let mut clearance = node.optional::<Clearance>("safety/clearance")?;
@@ -26,6 +29,7 @@ fn main() -> ExitCode {
             let inputs = Inputs {
                 truth: truth.read(),
                 mission: mission.read(),
+                journey: journey.read(),
                 location: location.read(),
                 applied: applied.read(),
                 clearance: clearance.read(),

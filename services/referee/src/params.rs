@@ -14,6 +14,8 @@ pub enum Mode {
     Delivery,
     /// A robot is located in a log: `location/pose` against `truth/pose`.
     Localisation,
+    /// A robot finds its way to a target in an arena: against `world/truth`.
+    Arena,
 }
 
 /// The parameters of the referee.
@@ -48,6 +50,15 @@ pub struct Params {
     /// Error that 95 % of the poses must stay below.
     #[schemars(range(min = 0.001, max = 100.0))]
     pub max_p95_m: f64,
+    /// How far from its target a robot in an arena may end.
+    #[schemars(range(min = 0.001, max = 10.0))]
+    pub max_target_error_m: f64,
+    /// Offset of the configuration space in which the shortest path is measured: half of the robot's length (NXT-070, NXT-104).
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub offset_m: f64,
+    /// A pose that is said to be certain is wrong when it is farther off than this.
+    #[schemars(range(min = 0.001, max = 10.0))]
+    pub wrong_pose_m: f64,
     /// Length of the robot's body.
     #[schemars(range(min = 0.05, max = 2.0))]
     pub body_length_m: f64,
@@ -72,6 +83,9 @@ impl Default for Params {
             fault_limit_s: 10.0,
             max_median_m: 0.25,
             max_p95_m: 0.8,
+            max_target_error_m: 0.03,
+            offset_m: 0.08,
+            wrong_pose_m: 0.05,
             body_length_m: 0.61,
             body_width_m: 0.51,
             body_height_m: 1.0,
@@ -126,6 +140,9 @@ impl messages::Parameters for Params {
         within("fault_limit_s", self.fault_limit_s, 0.0, 1000.0)?;
         within("max_median_m", self.max_median_m, 0.001, 100.0)?;
         within("max_p95_m", self.max_p95_m, 0.001, 100.0)?;
+        within("max_target_error_m", self.max_target_error_m, 0.001, 10.0)?;
+        within("offset_m", self.offset_m, 0.0, 2.0)?;
+        within("wrong_pose_m", self.wrong_pose_m, 0.001, 10.0)?;
         within("body_length_m", self.body_length_m, 0.05, 2.0)?;
         within("body_width_m", self.body_width_m, 0.05, 2.0)?;
         within("body_height_m", self.body_height_m, 0.05, 3.0)?;

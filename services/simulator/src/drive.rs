@@ -1,6 +1,6 @@
 //! Two motors, their wheels, and the ground.
 
-use crate::Params;
+use crate::{MotionErrors, Params};
 use geometry::Pose2;
 use messages::WheelSpeeds;
 use rand::Rng;
@@ -16,6 +16,57 @@ pub(crate) struct Drive {
     /// What the encoders have counted.
     pub(crate) left_travel_m: f64,
     pub(crate) right_travel_m: f64,
+    motion: Motion,
+}
+
+/// What a motion, from standing to standing, errs by.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Motion {
+    /// Whether the wheels turn.
+    goes_on: bool,
+    /// The absolute errors, and the share of them that is still to come.
+    error_m: f64,
+    error_rad: f64,
+    to_come: f64,
+    /// Every way and every turn is so much longer.
+    way_share: f64,
+    turn_share: f64,
+}
+
+/// An absolute error comes with the first of the way, as the backlash of gears does: all of it within these.
+const WITHIN_M: f64 = 0.02;
+const WITHIN_RAD: f64 = 0.1;
+
+impl Motion {
+    /// One step of the wheels over ground, ahead and around, with the errors.
+    fn err(&mut self, params: &Params, way_m: f64, turn_rad: f64, rng: &mut impl Rng) -> [f64; 2] {
+        if way_m == 0.0 && turn_rad == 0.0 {
+            *self = Self::default();
+            return [way_m, turn_rad];
+        }
+        if !std::mem::replace(&mut self.goes_on, true) {
+            let mut normal = || -> f64 { StandardNormal.sample(rng) };
+            let (first, second) = (normal(), normal());
+            self.to_come = 1.0;
+            let is_way = way_m.abs() > 0.5 * params.wheel_track_m * turn_rad.abs();
+            match params.motion_errors {
+                MotionErrors::None => {}
+                MotionErrors::Absolute if is_way => self.error_m = params.motion_error_m * first,
+                MotionErrors::Absolute => self.error_rad = params.motion_error_rad * first,
+                MotionErrors::Proportional if is_way => {
+                    self.way_share = params.way_error_fraction * first;
+                    self.error_rad = params.turn_error_fraction * second;
+                }
+                MotionErrors::Proportional => self.turn_share = params.turn_error_fraction * first,
+            }
+        }
+        let share = (way_m.abs() / WITHIN_M + turn_rad.abs() / WITHIN_RAD).min(self.to_come);
+        self.to_come -= share;
+        [
+            way_m * (1.0 + self.way_share) + share * self.error_m,
+            turn_rad * (1.0 + self.turn_share) + share * self.error_rad,
+        ]
+    }
 }
 
 impl Drive {
@@ -39,7 +90,12 @@ impl Drive {
         };
         let (left_m, right_m) = (over_ground(self.rim.left_mps), over_ground(self.rim.right_mps));
         self.ground = WheelSpeeds { left_mps: left_m / seconds, right_mps: right_m / seconds };
-        pose.after_arc(0.5 * (left_m + right_m), (right_m - left_m) / params.wheel_track_m)
+        let (way_m, turn_rad) = (0.5 * (left_m + right_m), (right_m - left_m) / params.wheel_track_m);
+        let [way_m, turn_rad] = match params.motion_errors {
+            MotionErrors::None => [way_m, turn_rad],
+            _ => self.motion.err(params, way_m, turn_rad, rng),
+        };
+        pose.after_arc(way_m, turn_rad)
     }
 
     /// The motion went ahead: the encoders count it.

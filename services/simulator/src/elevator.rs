@@ -3,7 +3,8 @@
 use crate::obstacles::Footprint;
 use geometry::world::{DoorGeometry, Elevator, World};
 use geometry::{Point2, Polygon, Pose2, Shape};
-use messages::{CarState, ElevatorCall, ElevatorState};
+use messages::{CarState, CarStateField, ElevatorCall, ElevatorState};
+use serde::{Deserialize, Serialize};
 
 /// A car begins at its lowest floor, closed.
 #[derive(Debug, Clone)]
@@ -15,6 +16,19 @@ pub(crate) struct Car {
     state: CarState,
     floor: i32,
     call: ElevatorCall,
+    wanted: Option<i32>,
+    opening: f64,
+    timer_s: f64,
+    rides: bool,
+}
+
+/// A car that is under way.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct KeptCar {
+    state: u32,
+    floor: i32,
+    /// Number, floor, and whether the doors are held.
+    call: (u64, i32, u32),
     wanted: Option<i32>,
     opening: f64,
     timer_s: f64,
@@ -46,6 +60,31 @@ impl Car {
             timer_s: 0.0,
             rides: false,
         })
+    }
+
+    /// What a successor needs.
+    pub(crate) fn kept(&self) -> KeptCar {
+        KeptCar {
+            state: CarStateField::from(self.state).0,
+            floor: self.floor,
+            call: (self.call.call_id, self.call.floor, self.call.hold_doors),
+            wanted: self.wanted,
+            opening: self.opening,
+            timer_s: self.timer_s,
+            rides: self.rides,
+        }
+    }
+
+    /// Goes on where a predecessor was.
+    pub(crate) fn go_on(&mut self, kept: &KeptCar) {
+        let Ok(state) = CarStateField(kept.state).get() else { return };
+        if !kept.opening.is_finite() || !kept.timer_s.is_finite() || !self.plan.floors.contains(&kept.floor) {
+            return;
+        }
+        let (call_id, floor, hold_doors) = kept.call;
+        self.call = ElevatorCall { call_id, floor, hold_doors };
+        (self.state, self.floor, self.wanted) = (state, kept.floor, kept.wanted);
+        (self.opening, self.timer_s, self.rides) = (kept.opening, kept.timer_s, kept.rides);
     }
 
     /// How far the door stands open at a floor, from 0 to 1.

@@ -4,6 +4,7 @@
 
 mod drive;
 mod elevator;
+mod kept;
 mod obstacles;
 mod params;
 mod people;
@@ -13,7 +14,8 @@ mod building_tests;
 #[cfg(test)]
 mod tests;
 
-pub use params::{Params, ParamsError};
+pub use kept::Snapshot;
+pub use params::{MotionErrors, Params, ParamsError};
 
 use drive::Drive;
 use elevator::{Car, Rider};
@@ -24,7 +26,7 @@ use messages::{
 };
 use obstacles::{Footprint, LeafOf, Obstacles, RELEASE_M};
 use people::{Person, RobotSeen};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use std::time::Duration;
 
@@ -34,6 +36,8 @@ const MOST_STEPS_AT_ONCE: u32 = 50;
 const ELEVATOR_PERIOD_S: f64 = 0.1;
 /// Faster than this no motor turns, whatever it is told.
 const FASTEST_MPS: f64 = 3.0;
+/// Tells the random numbers of a start from those of the wheels.
+const START_STREAM: u64 = 0x5747_4152_5453;
 
 /// What the simulator looks at.
 #[derive(Debug, Clone, Copy, Default)]
@@ -100,7 +104,9 @@ impl Simulator {
     pub fn in_world(params: Params, world: &World, seed: u64) -> Result<Self, ParamsError> {
         params.check()?;
         let (name, robot) = (params.world.clone(), params.robot.clone());
+        let random = params.random_start && !world.floors.is_empty();
         let (floor, pose) = match world.start(&robot) {
+            _ if random => (world.floors[0].number, Pose2::IDENTITY),
             Some(start) => (start.floor, start.pose),
             None if world.floors.is_empty() => (0, Pose2::IDENTITY),
             None => return Err(ParamsError::NoStart { world: name, robot }),
@@ -143,11 +149,33 @@ impl Simulator {
             params,
         };
         simulator.move_doors(0.0);
+        if random {
+            simulator.pose = simulator.random_pose(world, seed)?;
+        }
         simulator.write_truth();
         if simulator.touched(simulator.pose, 0.0) {
             return Err(ParamsError::StartBlocked { world: name, robot });
         }
         Ok(simulator)
+    }
+
+    /// Somewhere within the outline of the first floor, away from its walls, in any direction in which the body touches nothing.
+    fn random_pose(&mut self, world: &World, seed: u64) -> Result<Pose2, ParamsError> {
+        const TRIES: usize = 100;
+        let clearance_m = self.params.start_clearance_m;
+        let outline = world.floors.first().and_then(geometry::world::Floor::outline_polygon);
+        // A stream of its own: what happens later does not depend on how often a pose was refused.
+        let mut rng = Pcg64::seed_from_u64(seed ^ START_STREAM);
+        for _ in 0..TRIES {
+            let place =
+                outline.as_ref().and_then(|outline| outline.random_place(clearance_m, || rng.random()));
+            let Some(place) = place else { break };
+            let pose = Pose2::new(place.x, place.y, std::f64::consts::TAU * rng.random::<f64>());
+            if !self.touched(pose, RELEASE_M) {
+                return Ok(pose);
+            }
+        }
+        Err(ParamsError::NoRandomStart { world: self.params.world.clone(), clearance_m })
     }
 
     /// Lets the world's time catch up with `now`, in fixed steps.

@@ -5,6 +5,19 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
+/// Errors that a whole motion makes, from standing to standing, beside those of every single step. Encoders do not see them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MotionErrors {
+    /// None.
+    #[default]
+    None,
+    /// The same for every motion, whatever its length: a way errs by `motion_error_m`, a turn by `motion_error_rad` (NXT-101, X-11).
+    Absolute,
+    /// As the BotSim simulator has it (companions 1.2): in proportion, and every way begins with a turn of its own.
+    Proportional,
+}
+
 /// The parameters of the simulator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -13,6 +26,11 @@ pub struct Params {
     pub world: String,
     /// Which of the file's starts is the robot's.
     pub robot: String,
+    /// Whether the robot begins at a random pose within the outline of the world's first floor instead.
+    pub random_start: bool,
+    /// No nearer to a wall does a random start lie.
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub start_clearance_m: f64,
     /// The fixed step of the simulation; the truth is published after each.
     #[schemars(range(min = 1, max = 50))]
     pub period_ms: u32,
@@ -34,6 +52,20 @@ pub struct Params {
     /// Standard deviation of a wheel's way over ground after one metre; it grows with the root of the way.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub way_noise_m: f64,
+    /// Errors of whole motions.
+    pub motion_errors: MotionErrors,
+    /// Standard deviation of a way, where errors are absolute.
+    #[schemars(range(min = 0.0, max = 0.1))]
+    pub motion_error_m: f64,
+    /// Standard deviation of a turn, where errors are absolute.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub motion_error_rad: f64,
+    /// Standard deviation of a way as a share of it, where errors are proportional.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub way_error_fraction: f64,
+    /// Standard deviation of a turn as a share of it, and in radians of the turn that a way begins with, where errors are proportional.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub turn_error_fraction: f64,
     /// The motor controller stops the wheels when `wheels/applied` is older.
     #[schemars(range(min = 10, max = 1000))]
     pub watchdog_ms: u32,
@@ -61,6 +93,8 @@ impl Default for Params {
         Self {
             world: String::new(),
             robot: "coffee".to_owned(),
+            random_start: false,
+            start_clearance_m: 0.10,
             period_ms: 10,
             wheel_track_m: 0.40,
             left_gain: 1.0,
@@ -68,6 +102,11 @@ impl Default for Params {
             wheel_acceleration_m_per_s2: 0.8,
             slip_fraction: 0.01,
             way_noise_m: 0.004,
+            motion_errors: MotionErrors::None,
+            motion_error_m: 0.001,
+            motion_error_rad: 0.005,
+            way_error_fraction: 0.01,
+            turn_error_fraction: 0.005,
             watchdog_ms: 100,
             body_length_m: 0.61,
             body_width_m: 0.51,
@@ -107,6 +146,16 @@ pub enum ParamsError {
         /// The robot.
         robot: String,
     },
+    /// No random pose has room for the robot.
+    #[error(
+        "the world {world:?} has no outline with room for a robot start_clearance_m = {clearance_m} from its walls; lower it, or name a start"
+    )]
+    NoRandomStart {
+        /// The world file.
+        world: String,
+        /// The distance from walls.
+        clearance_m: f64,
+    },
     /// The robot begins inside something.
     #[error("the start of robot {robot:?} in {world:?} lies in a wall or a body; move it")]
     StartBlocked {
@@ -135,6 +184,11 @@ impl messages::Parameters for Params {
         within("wheel_acceleration_m_per_s2", self.wheel_acceleration_m_per_s2, 0.05, 20.0)?;
         within("slip_fraction", self.slip_fraction, 0.0, 0.5)?;
         within("way_noise_m", self.way_noise_m, 0.0, 0.1)?;
+        within("start_clearance_m", self.start_clearance_m, 0.0, 2.0)?;
+        within("motion_error_m", self.motion_error_m, 0.0, 0.1)?;
+        within("motion_error_rad", self.motion_error_rad, 0.0, 0.5)?;
+        within("way_error_fraction", self.way_error_fraction, 0.0, 0.5)?;
+        within("turn_error_fraction", self.turn_error_fraction, 0.0, 0.5)?;
         within("watchdog_ms", self.watchdog_ms.into(), 10.0, 1000.0)?;
         within("body_length_m", self.body_length_m, 0.05, 2.0)?;
         within("body_width_m", self.body_width_m, 0.05, 2.0)?;

@@ -33,6 +33,19 @@ impl Person {
         Self { walker, has_set_out: false, walked_s: 0.0, waited_s: 0.0, pose }
     }
 
+    /// Whether they have set out, how far they are, and how long they have waited.
+    pub(crate) fn kept(&self) -> (bool, f64, f64) {
+        (self.has_set_out, self.walked_s, self.waited_s)
+    }
+
+    /// Goes on from there.
+    pub(crate) fn go_on(&mut self, (has_set_out, walked_s, waited_s): (bool, f64, f64)) {
+        if walked_s.is_finite() && waited_s.is_finite() {
+            (self.has_set_out, self.walked_s, self.waited_s) = (has_set_out, walked_s, waited_s);
+            self.pose = self.walker.pose(walked_s);
+        }
+    }
+
     pub(crate) fn floor(&self) -> i32 {
         self.walker.floor
     }

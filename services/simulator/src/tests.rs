@@ -393,3 +393,24 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_successor_goes_on_with_the_world_as_it_was() {
+    let mut run = Run::new(ideal(), HALL);
+    let call = ElevatorCall { call_id: 1, floor: 1, hold_doors: 0 };
+    let before = run.drive_calling(0.3, 0.2, 2.0, Some(call));
+    let text = serde_json::to_string(&run.simulator.snapshot()).unwrap();
+    let mut successor = Run::new(ideal(), HALL);
+    successor.simulator.restore(&serde_json::from_str(&text).unwrap());
+    let after = successor.drive_calling(0.0, 0.0, 0.01, Some(call));
+    assert!(before.x_m > 0.3);
+    assert!((after.x_m - before.x_m).hypot(after.y_m - before.y_m) < 1e-9, "{after:?}");
+    assert_eq!((after.left_travel_m, after.right_travel_m), (before.left_travel_m, before.right_travel_m));
+    assert!(after.world_time_s >= before.world_time_s && after.contacts == before.contacts);
+    assert!(after.elevator_door_percent >= before.elevator_door_percent);
+    assert_eq!(after.left_mps, 0.0);
+    // Another world's state is no state of this one.
+    let mut other = Run::new(ideal(), "");
+    other.simulator.restore(&serde_json::from_str(&text).unwrap());
+    assert_eq!(other.simulator.snapshot().travel(), [0.0; 2]);
+}

@@ -135,3 +135,20 @@ proptest! {
         if probe.coords.norm() > 2.0 { prop_assert!(!polygon.contains(probe)); }
     }
 }
+
+#[test]
+fn random_places_keep_away_from_the_boundary() {
+    let polygon = Polygon::from_coordinates(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]])
+        .expect("an L");
+    let mut state = 1_u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    for _ in 0..200 {
+        let place = polygon.random_place(0.3, &mut uniform).expect("there is room");
+        assert!(polygon.contains(place) && polygon.distance_to_boundary_m(place) >= 0.3);
+    }
+    assert_eq!(polygon.random_place(0.6, &mut uniform), None);
+    assert_eq!(polygon.random_place(0.1, || f64::NAN), None);
+}

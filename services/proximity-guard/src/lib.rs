@@ -1,0 +1,115 @@
+//! Says whether the robot may drive: GO while the ultrasonic sensor watches ahead and sees nothing nearer than the threshold in two of three
+//! readings (NXT-024, NXT-091, NXT-092, X-05). `base-driver` lets the robot drive back, away from what is too near ahead, and nowhere else.
+
+mod params;
+
+#[cfg(test)]
+mod tests;
+
+pub use params::{Params, ParamsError};
+
+use messages::{Clearance, Face, GuardReasonName, Parameters, SonarAhead, Stamped, Time, Verdict};
+
+/// So many readings vote ...
+const VOTERS: usize = 3;
+/// ... and so many decide.
+const MAJORITY: usize = 2;
+
+/// What the guard looks at.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Inputs<'a> {
+    /// The newest of `sonar/ahead`.
+    pub ahead: Option<Stamped<'a, SonarAhead>>,
+}
+
+/// What the guard says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outputs {
+    /// For `safety/clearance`.
+    pub clearance: Clearance,
+}
+
+/// The guard. It begins with a STOP.
+#[derive(Debug, Clone)]
+pub struct ProximityGuard {
+    params: Params,
+    seen: Option<(Time, u64)>,
+    /// The last readings, the newest first.
+    readings_m: [Option<f64>; VOTERS],
+    go: bool,
+    changes: u64,
+}
+
+impl ProximityGuard {
+    /// A guard that knows nothing.
+    ///
+    /// # Errors
+    /// When the parameters make no sense.
+    pub fn new(params: Params) -> Result<Self, ParamsError> {
+        params.check()?;
+        Ok(Self { params, seen: None, readings_m: [None; VOTERS], go: false, changes: 0 })
+    }
+
+    /// Takes a reading into the vote, and says how it stands.
+    pub fn step(&mut self, now: Time, inputs: Inputs<'_>) -> Outputs {
+        let fresh = inputs.ahead.and_then(|ahead| ahead.fresh(now, self.params.max_age()));
+        let (reason, violated_faces) = match fresh {
+            None => {
+                self.readings_m = [None; VOTERS];
+                (if inputs.ahead.is_none() { GuardReasonName::Start } else { GuardReasonName::Stale }, 0)
+            }
+            Some(ahead) => match ahead.distance_m() {
+                None => {
+                    self.readings_m = [None; VOTERS];
+                    (GuardReasonName::SensorFault, 0)
+                }
+                Some(distance_m) => {
+                    if self.seen.replace((ahead.stamp, ahead.sequence)) != Some((ahead.stamp, ahead.sequence)) {
+                        self.readings_m.rotate_right(1);
+                        self.readings_m[0] = Some(distance_m);
+                    }
+                    self.vote()
+                }
+            },
+        };
+        let go = reason == GuardReasonName::Clear;
+        self.changes += u64::from(go != self.go);
+        self.go = go;
+        let front_m = self.front_m() as f32;
+        let signal = if go { Verdict::Go } else { Verdict::Stop };
+        let nothing = f32::INFINITY;
+        Outputs {
+            clearance: Clearance {
+                signal: signal.into(),
+                reason: reason.into(),
+                violated_faces,
+                front_m,
+                right_m: nothing,
+                left_m: nothing,
+                changes: self.changes,
+            },
+        }
+    }
+
+    fn vote(&self) -> (GuardReasonName, u32) {
+        let count = |near: bool| {
+            let votes = self.readings_m.iter().flatten();
+            votes.filter(|distance_m| (**distance_m < self.params.stop_distance_m) == near).count()
+        };
+        if count(true) >= MAJORITY {
+            (GuardReasonName::Violation, Face::Front as u32)
+        } else if count(false) >= MAJORITY {
+            (GuardReasonName::Clear, 0)
+        } else {
+            // The sensor has just begun to look.
+            (GuardReasonName::Settling, 0)
+        }
+    }
+
+    /// The middle of the readings there are; infinite without any.
+    fn front_m(&self) -> f64 {
+        let mut readings: Vec<f64> = self.readings_m.iter().flatten().copied().collect();
+        readings.sort_by(f64::total_cmp);
+        readings.get(readings.len().saturating_sub(1) / 2).copied().unwrap_or(f64::INFINITY)
+    }
+}

@@ -1,0 +1,71 @@
+//! The parameters of the guard.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// The parameters of the guard.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Params {
+    /// Nothing ahead may be nearer to the sensor, which sits above the centre of motion: half of the robot's length and a centimetre.
+    #[schemars(range(min = 0.01, max = 2.0))]
+    pub stop_distance_m: f64,
+    /// Readings older than this count for nothing.
+    #[schemars(range(min = 10, max = 1000))]
+    pub max_age_ms: u32,
+    /// The guard speaks at least so often.
+    #[schemars(range(min = 5, max = 100))]
+    pub period_ms: u32,
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self { stop_distance_m: 0.09, max_age_ms: 100, period_ms: 40 }
+    }
+}
+
+/// Why parameters of the guard are refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ParamsError {
+    /// A number outside of what is possible.
+    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Smallest possible value.
+        min: f64,
+        /// Largest possible value.
+        max: f64,
+    },
+}
+
+impl Params {
+    /// Between two words without a reading.
+    pub fn period(&self) -> Duration {
+        Duration::from_millis(self.period_ms.into())
+    }
+
+    /// How old a reading may be.
+    pub fn max_age(&self) -> Duration {
+        Duration::from_millis(self.max_age_ms.into())
+    }
+}
+
+impl messages::Parameters for Params {
+    type Error = ParamsError;
+
+    fn check(&self) -> Result<(), ParamsError> {
+        let ranges = [
+            ("stop_distance_m", self.stop_distance_m, 0.01, 2.0),
+            ("max_age_ms", self.max_age_ms.into(), 10.0, 1000.0),
+            ("period_ms", self.period_ms.into(), 5.0, 100.0),
+        ];
+        match ranges.iter().find(|(_, value, min, max)| !(min..=max).contains(&value)) {
+            Some(&(name, value, min, max)) => Err(ParamsError::OutOfRange { name, value, min, max }),
+            None => Ok(()),
+        }
+    }
+}
