@@ -7,6 +7,8 @@ use messages::RangeScan;
 const TURN_STEP_RAD: f64 = 0.07;
 /// Ways are looked at in steps of this.
 const WAY_STEP_M: f64 = 0.02;
+/// Room that grows by more than this from step to step is that of a body that leaves a wall.
+const LEAVING_M: f64 = 1e-4;
 /// Readings on either side of a reading among which the middle one counts: a single late echo opens no gap.
 const MEDIAN_HALF: usize = 2;
 
@@ -68,18 +70,29 @@ impl Arena {
     pub(crate) fn turning_room_m(&self, pose: Pose2, turn_rad: f64) -> f64 {
         let steps = (turn_rad.abs() / TURN_STEP_RAD).ceil().clamp(1.0, 200.0) as u32;
         let at = |step: u32| f64::from(step) / f64::from(steps) * turn_rad;
-        (0..=steps)
-            .map(|step| self.room_m(Pose2::new(pose.x_m, pose.y_m, pose.heading_rad + at(step))))
-            .fold(f64::INFINITY, f64::min)
+        let poses = (0..=steps).map(|step| Pose2::new(pose.x_m, pose.y_m, pose.heading_rad + at(step)));
+        self.least_room_m(poses)
     }
 
     /// The least room around the body while it drives straight.
     pub(crate) fn driving_room_m(&self, pose: Pose2, way_m: f64) -> f64 {
         let steps = (way_m.abs() / WAY_STEP_M).ceil().clamp(1.0, 500.0) as u32;
         let at = |step: u32| f64::from(step) / f64::from(steps) * way_m;
-        (0..=steps)
-            .map(|step| self.room_m(pose.compose(Pose2::new(at(step), 0.0, 0.0))))
-            .fold(f64::INFINITY, f64::min)
+        self.least_room_m((0..=steps).map(|step| pose.compose(Pose2::new(at(step), 0.0, 0.0))))
+    }
+
+    /// The least room at any of these poses. What the body is leaving does not count: it is there, however near a wall seems to be.
+    fn least_room_m(&self, poses: impl Iterator<Item = Pose2>) -> f64 {
+        let (mut least_m, mut last_m, mut is_leaving) = (f64::INFINITY, None, true);
+        for pose in poses {
+            let room_m = self.room_m(pose);
+            is_leaving &= last_m.is_none_or(|last_m| room_m > last_m + LEAVING_M);
+            if !is_leaving {
+                least_m = least_m.min(room_m);
+            }
+            last_m = Some(room_m);
+        }
+        least_m.min(last_m.unwrap_or(f64::INFINITY))
     }
 
     /// Distance of a straight way from the nearest wall.
@@ -171,6 +184,28 @@ pub(crate) fn turning_room_m(views: &[View<'_>], ahead_m: f64, turn_rad: f64) ->
 /// The same while it drives straight.
 pub(crate) fn driving_room_m(views: &[View<'_>], way_m: f64) -> f64 {
     views.iter().map(|view| view.arena.driving_room_m(view.pose, way_m)).fold(f64::INFINITY, f64::min)
+}
+
+/// How far a body that cannot turn anywhere may turn, and then drive, to get away from a wall beside it.
+const ESCAPE_RAD: [f64; 6] = [0.15, -0.15, 0.30, -0.30, 0.45, -0.45];
+const ESCAPE_M: [f64; 6] = [0.05, -0.05, 0.10, -0.10, 0.15, -0.15];
+/// Less room is none.
+const NO_ROOM_M: f64 = 0.003;
+
+/// A small turn and a short way that lead the body out of a narrow place, to where there is more room.
+pub(crate) fn escape(views: &[View<'_>]) -> Option<(f64, f64)> {
+    let ways = ESCAPE_RAD.into_iter().flat_map(|turn_rad| ESCAPE_M.map(|way_m| (turn_rad, way_m)));
+    let room_m = |(turn_rad, way_m): (f64, f64)| {
+        let turned: Vec<View<'_>> = views
+            .iter()
+            .map(|view| View { pose: view.pose.compose(Pose2::new(0.0, 0.0, turn_rad)), ..*view })
+            .collect();
+        let on_the_way_m = turning_room_m(views, 0.0, turn_rad).min(driving_room_m(&turned, way_m));
+        let there_m = turned.iter().map(|view| view.arena.room_m(view.pose.compose(Pose2::new(way_m, 0.0, 0.0))));
+        (on_the_way_m >= NO_ROOM_M).then(|| there_m.fold(f64::INFINITY, f64::min))
+    };
+    let free = ways.filter_map(|way| Some((way, room_m(way)?)));
+    free.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(way, _)| way)
 }
 
 /// The cheapest way to look at a place, given as seen from the robot, with room for the body in all views; the roomiest where there is not

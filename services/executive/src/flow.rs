@@ -1,6 +1,6 @@
 //! What comes next: the flow of Fig. 8 (NXT-095), one task after the other.
 
-use crate::arena::{Manoeuvre, View, driving_room_m, manoeuvre, turning_room_m};
+use crate::arena::{Manoeuvre, View, driving_room_m, escape, manoeuvre, turning_room_m};
 use crate::{Executive, Inputs, resolve};
 use geometry::{Point2, Pose2, angle};
 use messages::{
@@ -69,6 +69,9 @@ const NO_TURN_RAD: f64 = 0.03;
 const REACHED_M: f64 = 0.004;
 /// Ways to tell places apart are looked for along the belief's best place; they may be so wrong.
 const STEP_M: f64 = 0.02;
+/// Where a turn has less room the robot first gets away from the walls, so often at most.
+const NARROW_M: f64 = 0.005;
+const MOST_ESCAPES: u32 = 3;
 /// A way shorter than this leads nowhere.
 const NO_WAY_M: f64 = 0.03;
 /// A scan is worth looking at while the robot is no farther from where it was taken.
@@ -201,11 +204,13 @@ impl Executive {
     /// Waits until the localiser has taken in the scan, then decides whether the place is known.
     fn locate(&mut self, now: Time, scans: u64, since: Time) -> bool {
         let is_new = self.belief.is_some_and(|belief| belief.scans > scans);
-        let is_shown = self.cloud_stamp.is_some_and(|stamp| stamp >= since);
+        // A cloud of that very moment may have been shown before the scan was weighed.
+        let is_shown = self.cloud_stamp.is_some_and(|stamp| stamp > since);
         if !(is_new && is_shown) {
             return self.keep(now, Task::Locating { scans, since });
         }
         self.only_localising = false;
+        self.escapes = 0;
         self.seen_at = self.belief.map_or(Pose2::IDENTITY, |belief| belief.pose);
         if self.place().is_none() {
             self.count.ambiguous += 1;
@@ -359,8 +364,16 @@ impl Executive {
                     if left_m <= REACHED_M {
                         continue;
                     }
-                    let Manoeuvre { first_m, turn_rad, .. } = self.turn_to(belief.pose, place);
-                    if first_m != 0.0 || turn_rad != 0.0 {
+                    let Manoeuvre { first_m, turn_rad, room_m } = self.turn_to(belief.pose, place);
+                    if room_m < NARROW_M
+                        && self.escapes < MOST_ESCAPES
+                        && let Some((turn_rad, way_m)) = escape(&self.views())
+                    {
+                        self.escapes += 1;
+                        rest.push_front(motion);
+                        rest.push_front(Motion::Move(way_m));
+                        self.order(MotionKindName::Turn, turn_rad);
+                    } else if first_m != 0.0 || turn_rad != 0.0 {
                         rest.push_front(motion);
                         if first_m != 0.0 {
                             self.order(MotionKindName::Move, first_m);
@@ -368,11 +381,11 @@ impl Executive {
                             self.order(MotionKindName::Turn, turn_rad);
                         }
                     } else {
-                        let certain_m = if stage == JourneyStageName::Driving {
-                            self.certain_way_m(belief.pose, place, belief.sigma_m, belief.sigma_rad)
-                        } else {
-                            self.seen_way_m(left_m)
-                        };
+                        let mut certain_m =
+                            self.certain_way_m(belief.pose, place, belief.sigma_m, belief.sigma_rad);
+                        if stage == JourneyStageName::Resolving {
+                            certain_m = certain_m.min(self.seen_way_m(left_m));
+                        }
                         if certain_m < left_m - REACHED_M {
                             rest.clear();
                             then = Then::Survey;

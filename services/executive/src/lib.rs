@@ -74,6 +74,8 @@ pub struct Executive {
     waits_since: Option<Time>,
     /// Whether the robot has come to the end of a path.
     at_end: bool,
+    /// Narrow places that it has left since its last scan.
+    escapes: u32,
     only_localising: bool,
     count: Count,
     remark: FixedText<64>,
@@ -136,6 +138,7 @@ impl Executive {
             cloud_stamp: None,
             waits_since: None,
             at_end: false,
+            escapes: 0,
             only_localising: false,
             count: Count::default(),
             remark: FixedText::EMPTY,

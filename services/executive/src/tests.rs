@@ -1,0 +1,2 @@
+mod journey;
+mod rooms;
