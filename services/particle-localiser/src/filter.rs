@@ -13,6 +13,20 @@ use crate::recovery::Averages;
 use crate::resample::{comb, resample_clusters};
 use crate::{Beams, Map, Particles, Weigher, kld};
 use geometry::Pose2;
+use serde::{Deserialize, Serialize};
+
+/// The belief of a filter, thinned, as it is handed over.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Belief {
+    /// The map's own frame in that of the map's file.
+    origin: [f64; 3],
+    /// Places and headings in the own frame, all of the same weight.
+    particles: Vec<[f32; 3]>,
+    spread: [f64; 2],
+    averages: Averages,
+    searches: u32,
+    epoch: u64,
+}
 
 /// What an update found.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -83,8 +97,8 @@ impl Budget {
 
 /// However small the bound, this many particles are kept.
 const FEWEST: usize = 10;
-/// Candidates for each particle that is scattered to recover.
-const CANDIDATES: usize = 10;
+/// Fewest candidates for the particles that are scattered to recover.
+const CANDIDATES: usize = 2000;
 /// Weight of all scattered particles together, for each unit of their share.
 const SCATTERED_PRIOR: f64 = 0.001;
 /// From one pass to the next the spread shrinks to this.
@@ -149,6 +163,45 @@ impl Filter {
     pub fn forget(&mut self) {
         self.particles.clear();
         self.averages = Averages::default();
+    }
+
+    /// The belief in at most so many particles, each cluster with its share; `None` when there is none.
+    pub(crate) fn belief(&self, most: usize) -> Option<Belief> {
+        let (all, count) = (&self.particles, self.particles.len().min(most));
+        let mut particles = Vec::with_capacity(count);
+        comb(&all.weight, count, self.seed, self.epoch, |index| particles.push(all.pose(index)));
+        let origin = self.map.from_own(Pose2::IDENTITY);
+        (count > 0).then(|| Belief {
+            origin: [origin.x_m, origin.y_m, origin.heading_rad],
+            particles,
+            spread: [self.spread.place_m, self.spread.heading_rad],
+            averages: self.averages,
+            searches: self.searches,
+            epoch: self.epoch,
+        })
+    }
+
+    /// Takes over a belief, on a map that may have another frame, and tells its clusters. `None`, and nothing is changed, when it is none.
+    pub(crate) fn take_over(&mut self, belief: &Belief) -> Option<Vec<Cluster>> {
+        let Belief { origin: [x_m, y_m, heading_rad], ref particles, spread, averages, searches, epoch } =
+            *belief;
+        let numbers = particles.iter().flatten().map(|number| f64::from(*number));
+        let mut numbers = numbers.chain([x_m, y_m, heading_rad]).chain(spread).chain(averages.numbers());
+        // No larger map exists.
+        let is_sound = numbers.all(|number| number.abs() < 1e7);
+        if !is_sound || particles.is_empty() || particles.len() > self.params.max_particles as usize {
+            return None;
+        }
+        let moved = self.map.to_own(Pose2::new(x_m, y_m, heading_rad));
+        self.particles.clear();
+        for &[x, y, heading] in particles {
+            let pose = moved.compose(Pose2::new(f64::from(x), f64::from(y), f64::from(heading)));
+            self.particles.push([pose.x_m as f32, pose.y_m as f32, pose.heading_rad as f32]);
+        }
+        self.particles.level();
+        self.spread = MotionSigma { place_m: spread[0].abs(), heading_rad: spread[1].abs() };
+        (self.averages, self.searches, self.epoch) = (averages, searches, epoch);
+        Some(self.finder.find(&self.particles, self.division))
     }
 
     /// Begins anew around a pose in the frame of the map's file.
@@ -272,7 +325,10 @@ impl Filter {
             self.draw(count);
             return 0;
         }
-        let candidates = budget.affordable(CANDIDATES * scattered.max(200), beams.len());
+        // A robot that is surely lost searches as thoroughly as at a start without a pose; one that may be lost, less so.
+        let thoroughness = share / recovery.most_scattered.max(f64::MIN_POSITIVE);
+        let thorough = (thoroughness * f64::from(self.params.global_particles)) as usize;
+        let candidates = budget.affordable(thorough.max(CANDIDATES).max(scattered), beams.len());
         if candidates < scattered {
             self.draw(count);
             return 0;

@@ -15,6 +15,7 @@ mod particles;
 mod random;
 mod recovery;
 mod resample;
+mod snapshot;
 mod trigonometry;
 mod weigh;
 
@@ -29,6 +30,7 @@ pub use motion::{MotionSigma, Travel};
 pub use params::{Model, MotionNoise, Params, ParamsError, Recovery, Sensor, Start};
 pub use particles::Particles;
 pub use recovery::Averages;
+pub use snapshot::Snapshot;
 pub use weigh::Weigher;
 
 use geometry::Pose2;
