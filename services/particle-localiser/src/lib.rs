@@ -13,6 +13,7 @@ mod motion;
 mod params;
 mod particles;
 mod random;
+mod ratios;
 mod recovery;
 mod resample;
 mod snapshot;
