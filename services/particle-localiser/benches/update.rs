@@ -1,7 +1,7 @@
 //! Milliseconds for an update, with its accuracy beside it: `cargo bench -p particle-localiser`.
 //!
 //! "weigh" is the measurement model alone; "update" is all of it: motion, model, weights, clusters, estimate, and the drawing of the next
-//! generation, while the pose is followed. One thread, medians. The error is that of the last update's likeliest place.
+//! generation, while the pose is followed. One thread. The error is that of the last update's likeliest place.
 #![allow(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 
 use geometry::{Grid, GridFrame, Occupancy, OccupancyGrid, Pose2, angle};
@@ -53,24 +53,36 @@ fn scan(grid: &OccupancyGrid, pose: Pose2, beams: usize) -> (RangeScan, Vec<f32>
     (header, ranges.collect())
 }
 
-fn median_ms(rounds: usize, mut work: impl FnMut()) -> f64 {
-    let mut times: Vec<f64> = (0..rounds)
-        .map(|_| {
-            let begin = Instant::now();
-            work();
-            begin.elapsed().as_secs_f64() * 1e3
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
-    times[rounds / 2]
+/// Processor time of this thread: other processes of the machine do not count.
+fn cpu_ms() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6
+}
+
+/// Times of repeated work.
+#[derive(Debug, Default)]
+struct Times(Vec<f64>);
+
+impl Times {
+    fn take(&mut self, work: impl FnOnce()) {
+        let begin = cpu_ms();
+        work();
+        self.0.push(cpu_ms() - begin);
+    }
+
+    fn quantile(&mut self, share: f64) -> f64 {
+        self.0.sort_by(f64::total_cmp);
+        self.0[(self.0.len() as f64 * share) as usize]
+    }
 }
 
 fn main() {
     let grid = office();
     let map = Map::of_grid(&grid, 65);
+    println!("processor time in ms, least and median");
     println!(
-        "{:<18} {:>9} {:>5} {:>10} {:>10} {:>8} {:>10} {:>10}",
-        "model", "particles", "beams", "weigh ms", "update ms", "bar ms", "error m", "mrad"
+        "{:<18} {:>9} {:>5} {:>8} {:>8} {:>8} {:>8} {:>6} {:>9} {:>6}",
+        "model", "particles", "beams", "weigh", "median", "update", "median", "bar", "error m", "mrad"
     );
     let cases = [
         (Model::LikelihoodField, 2000, 60, 0.2),
@@ -95,7 +107,8 @@ fn main() {
         let weigher = Weigher::new(&params, &map);
         let build_ms = build.elapsed().as_secs_f64() * 1e3;
         let poses = [Pose2::new(8.0, 12.0, 0.3), Pose2::new(15.5, 7.0, 2.0), Pose2::new(22.0, 23.5, -2.4)];
-        let (mut weigh_ms, mut update_ms, mut error_m, mut error_rad) = (0.0, 0.0, 0.0, 0.0);
+        let (mut weigh, mut update) = (Times::default(), Times::default());
+        let (mut error_m, mut error_rad) = (0.0, 0.0);
         for (seed, pose) in (1..).zip(poses) {
             let (header, ranges) = scan(&grid, pose, beams);
             let beams = Beams::select(&header, &ranges, 12.0, beams);
@@ -109,22 +122,28 @@ fn main() {
             let mut filter = Filter::new(Params { start: Some(start), ..params.clone() }, map.clone(), seed);
             let particles: Particles = filter.particles().clone();
             let mut points = Vec::new();
-            weigh_ms +=
-                median_ms(51, || weigher.weigh(black_box(&particles), black_box(&beams), &mut points)) / 3.0;
             let mut last = filter.correct(&beams);
             let drive = Travel { path_m: 0.1, ..Travel::default() };
-            update_ms += median_ms(51, || {
-                filter.advance(&drive);
-                last = filter.correct(&beams);
-            }) / 3.0;
+            // In turns, so that what disturbs one disturbs the other.
+            for _ in 0..51 {
+                weigh.take(|| weigher.weigh(black_box(&particles), black_box(&beams), &mut points));
+                update.take(|| {
+                    filter.advance(&drive);
+                    last = filter.correct(&beams);
+                });
+            }
             if let Some(best) = last.and_then(|update| update.clusters.first().copied()) {
                 error_m += best.pose.distance_m(pose) / 3.0;
                 error_rad += angle::difference(best.pose.heading_rad, pose.heading_rad).abs() / 3.0;
             }
         }
         println!(
-            "{:<18} {count:>9} {beams:>5} {weigh_ms:>10.3} {update_ms:>10.3} {bar_ms:>8.1} {error_m:>10.3} {:>10.2}   tables {} KiB in {build_ms:.1} ms",
+            "{:<18} {count:>9} {beams:>5} {:>8.3} {:>8.3} {:>8.3} {:>8.3} {bar_ms:>6.1} {error_m:>9.3} {:>6.2}   tables {} KiB in {build_ms:.1} ms",
             format!("{model:?}"),
+            weigh.quantile(0.02),
+            weigh.quantile(0.5),
+            update.quantile(0.02),
+            update.quantile(0.5),
             error_rad * 1e3,
             weigher.table_bytes() / 1024,
         );

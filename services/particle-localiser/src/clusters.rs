@@ -32,7 +32,8 @@ impl Cluster {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Finder {
     table: BinTable,
-    of_particle: Vec<u32>,
+    /// For each particle the number of its bin.
+    pub(crate) of_particle: Vec<u32>,
     /// For each particle the place of its cluster in the list that was returned last.
     pub(crate) ranks: Vec<u32>,
     mass: Vec<f64>,

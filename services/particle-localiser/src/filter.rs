@@ -5,14 +5,29 @@
 //! belief (Fox 2003) and a bound of the work; a start without a pose, and the recovery of a robot that was carried away, search the whole
 //! map by the same passes.
 
-use crate::bins::{BinTable, Division};
+use crate::bins::Division;
 use crate::clusters::{Cluster, Finder};
 use crate::motion::{MotionSigma, Travel, advance};
 use crate::params::{Params, Start};
+use crate::ratios::Ratios;
 use crate::recovery::Averages;
 use crate::resample::{comb, resample_clusters};
 use crate::{Beams, Map, Particles, Weigher, kld};
 use geometry::Pose2;
+use serde::{Deserialize, Serialize};
+
+/// The belief of a filter, thinned, as it is handed over.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Belief {
+    /// The map's own frame in that of the map's file.
+    origin: [f64; 3],
+    /// Places and headings in the own frame, all of the same weight.
+    particles: Vec<[f32; 3]>,
+    spread: [f64; 2],
+    averages: Averages,
+    searches: u32,
+    epoch: u64,
+}
 
 /// What an update found.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -54,7 +69,8 @@ pub struct Filter {
     /// Scans that are still to come in which the whole map is searched beside what has been found.
     searches: u32,
     finder: Finder,
-    bins: BinTable,
+    /// Of each bin, whether a particle in it would be drawn.
+    is_hit: Vec<bool>,
     points: Vec<u32>,
 }
 
@@ -83,8 +99,8 @@ impl Budget {
 
 /// However small the bound, this many particles are kept.
 const FEWEST: usize = 10;
-/// Candidates for each particle that is scattered to recover.
-const CANDIDATES: usize = 10;
+/// Fewest candidates for the particles that are scattered to recover.
+const CANDIDATES: usize = 2000;
 /// Weight of all scattered particles together, for each unit of their share.
 const SCATTERED_PRIOR: f64 = 0.001;
 /// From one pass to the next the spread shrinks to this.
@@ -111,7 +127,7 @@ impl Filter {
             averages: Averages::default(),
             searches: 0,
             finder: Finder::default(),
-            bins: BinTable::default(),
+            is_hit: Vec::new(),
             points: Vec::new(),
         };
         if let Some(start) = start {
@@ -149,6 +165,45 @@ impl Filter {
     pub fn forget(&mut self) {
         self.particles.clear();
         self.averages = Averages::default();
+    }
+
+    /// The belief in at most so many particles, each cluster with its share; `None` when there is none.
+    pub(crate) fn belief(&self, most: usize) -> Option<Belief> {
+        let (all, count) = (&self.particles, self.particles.len().min(most));
+        let mut particles = Vec::with_capacity(count);
+        comb(&all.weight, count, self.seed, self.epoch, |index| particles.push(all.pose(index)));
+        let origin = self.map.from_own(Pose2::IDENTITY);
+        (count > 0).then(|| Belief {
+            origin: [origin.x_m, origin.y_m, origin.heading_rad],
+            particles,
+            spread: [self.spread.place_m, self.spread.heading_rad],
+            averages: self.averages,
+            searches: self.searches,
+            epoch: self.epoch,
+        })
+    }
+
+    /// Takes over a belief, on a map that may have another frame, and tells its clusters. `None`, and nothing is changed, when it is none.
+    pub(crate) fn take_over(&mut self, belief: &Belief) -> Option<Vec<Cluster>> {
+        let Belief { origin: [x_m, y_m, heading_rad], ref particles, spread, averages, searches, epoch } =
+            *belief;
+        let numbers = particles.iter().flatten().map(|number| f64::from(*number));
+        let mut numbers = numbers.chain([x_m, y_m, heading_rad]).chain(spread).chain(averages.numbers());
+        // No larger map exists.
+        let is_sound = numbers.all(|number| number.abs() < 1e7);
+        if !is_sound || particles.is_empty() || particles.len() > self.params.max_particles as usize {
+            return None;
+        }
+        let moved = self.map.to_own(Pose2::new(x_m, y_m, heading_rad));
+        self.particles.clear();
+        for &[x, y, heading] in particles {
+            let pose = moved.compose(Pose2::new(f64::from(x), f64::from(y), f64::from(heading)));
+            self.particles.push([pose.x_m as f32, pose.y_m as f32, pose.heading_rad as f32]);
+        }
+        self.particles.level();
+        self.spread = MotionSigma { place_m: spread[0].abs(), heading_rad: spread[1].abs() };
+        (self.averages, self.searches, self.epoch) = (averages, searches, epoch);
+        Some(self.finder.find(&self.particles, self.division))
     }
 
     /// Begins anew around a pose in the frame of the map's file.
@@ -272,7 +327,10 @@ impl Filter {
             self.draw(count);
             return 0;
         }
-        let candidates = budget.affordable(CANDIDATES * scattered.max(200), beams.len());
+        // A robot that is surely lost searches as thoroughly as at a start without a pose; one that may be lost, less so.
+        let thoroughness = share / recovery.most_scattered.max(f64::MIN_POSITIVE);
+        let thorough = (thoroughness * f64::from(self.params.global_particles)) as usize;
+        let candidates = budget.affordable(thorough.max(CANDIDATES).max(scattered), beams.len());
         if candidates < scattered {
             self.draw(count);
             return 0;
@@ -325,14 +383,18 @@ impl Filter {
         (particles, spread)
     }
 
-    /// How many particles the belief needs: as many as its spread over bins asks for, when as many are drawn as there are now.
+    /// How many particles the belief needs: as many as its spread over bins asks for, when as many are drawn as there are now. The bins are
+    /// those in which clusters were found last.
     fn wanted(&mut self) -> usize {
-        let Self { bins, particles, division, .. } = self;
-        bins.reset(particles.len());
+        let Self { finder, particles, is_hit, .. } = self;
+        is_hit.clear();
+        is_hit.resize(particles.len(), false);
+        let mut hit = 0;
         comb(&particles.weight, particles.len(), self.seed, self.epoch, |index| {
-            bins.add(division.bin(particles.pose(index)));
+            let bin = &mut is_hit[finder.of_particle[index] as usize];
+            hit += usize::from(!std::mem::replace(bin, true));
         });
-        kld::enough(self.bins.bins.len(), self.params.kld_error, self.params.kld_quantile)
+        kld::enough(hit, self.params.kld_error, self.params.kld_quantile)
     }
 
     /// Weighs particles by a scan in passes. Each pass uses up as much of the scan's likelihood, as an exponent, as leaves enough
@@ -356,15 +418,15 @@ impl Filter {
                 let mean: f64 = points.iter().zip(&particles.weight).map(|(&p, w)| f64::from(p) * w).sum();
                 done.fit = Weigher::fit(mean, beams.len());
             }
-            let logs: Vec<f64> =
-                points.iter().map(|&points| self.weigher.log_likelihood(points, beams.len())).collect();
             let effective = self.params.pass_effective_share * particles.len() as f64;
+            let best = points.iter().copied().max().unwrap_or(0);
+            let ratios = |exponent: f64| self.weigher.ratios(best, beams.len(), exponent);
             let exponent = if passes == 1 {
                 remaining
             } else {
-                exponent(&particles.weight, &logs, remaining, effective)
+                exponent(&particles.weight, &points, ratios, remaining, effective)
             };
-            sharpen(&mut particles.weight, &logs, exponent);
+            sharpen(&mut particles.weight, &points, &ratios(exponent));
             remaining -= exponent;
             if remaining < 1e-6 || done.passes >= passes {
                 break;
@@ -395,15 +457,21 @@ struct Annealed {
 }
 
 /// The largest exponent up to `most` with which at least `effective` particles stay effective.
-fn exponent(weights: &[f64], logs: &[f64], most: f64, effective: f64) -> f64 {
-    let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+fn exponent(
+    weights: &[f64],
+    points: &[u32],
+    ratios: impl Fn(f64) -> Ratios,
+    most: f64,
+    effective: f64,
+) -> f64 {
     // All, or an even selection: an estimate is enough.
     let stride = weights.len().div_ceil(2048).max(1);
     let share = (weights.len() as f64 / weights.len().div_ceil(stride) as f64).max(1.0);
     let is_enough = |exponent: f64| {
         let (mut sum, mut squares) = (0.0, 0.0);
-        for (weight, log) in weights.iter().zip(logs).step_by(stride) {
-            let weight = weight * (exponent * (log - best)).exp();
+        let ratios = ratios(exponent);
+        for (weight, points) in weights.iter().zip(points).step_by(stride) {
+            let weight = weight * ratios.of(*points);
             sum += weight;
             squares += weight * weight;
         }
@@ -421,12 +489,11 @@ fn exponent(weights: &[f64], logs: &[f64], most: f64, effective: f64) -> f64 {
     low.max(1e-3 * most)
 }
 
-/// Multiplies weights by likelihoods to a power, and makes them sum to 1.
-fn sharpen(weights: &mut [f64], logs: &[f64], exponent: f64) {
-    let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+/// Multiplies weights by likelihoods, and makes them sum to 1.
+fn sharpen(weights: &mut [f64], points: &[u32], ratios: &Ratios) {
     let mut total = 0.0;
-    for (weight, log) in weights.iter_mut().zip(logs) {
-        *weight *= (exponent * (log - best)).exp();
+    for (weight, points) in weights.iter_mut().zip(points) {
+        *weight *= ratios.of(*points);
         total += *weight;
     }
     if total > 0.0 && total.is_finite() {

@@ -13,8 +13,10 @@ mod motion;
 mod params;
 mod particles;
 mod random;
+mod ratios;
 mod recovery;
 mod resample;
+mod snapshot;
 mod trigonometry;
 mod weigh;
 
@@ -29,6 +31,7 @@ pub use motion::{MotionSigma, Travel};
 pub use params::{Model, MotionNoise, Params, ParamsError, Recovery, Sensor, Start};
 pub use particles::Particles;
 pub use recovery::Averages;
+pub use snapshot::Snapshot;
 pub use weigh::Weigher;
 
 use geometry::Pose2;

@@ -1,6 +1,6 @@
 //! The process around `particle_localiser`.
 use messages::{Odometry, ParticleCloud, PoseEstimate, RangeScan};
-use particle_localiser::{Inputs, Map, Params, ParticleLocaliser, Sensor};
+use particle_localiser::{Inputs, Map, Params, ParticleLocaliser, Sensor, Snapshot};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -18,7 +18,11 @@ fn main() -> ExitCode {
         node.wake_on(&scans);
         node.every(Duration::from_millis(100));
         let map = Map::load(&params)?;
+        let mut kept = node.kept::<Option<Snapshot>>();
         let mut localiser = ParticleLocaliser::new(params, map, node.seed())?;
+        if let Some(snapshot) = kept.restore().flatten() {
+            localiser.restore(&snapshot);
+        }
         Ok(move |now| {
             let mut inputs = Inputs { odometry: odometry.read(), scan: scans.next() };
             loop {
@@ -32,6 +36,9 @@ fn main() -> ExitCode {
                     pose.publish(&estimate);
                     break;
                 }
+            }
+            if localiser.last_update().is_some() {
+                kept.save_now_and_then(now, || localiser.snapshot());
             }
         })
     })

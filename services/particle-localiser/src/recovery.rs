@@ -1,9 +1,10 @@
 //! Has the robot been carried away? A slow and a fast average of how well the scans fit (Thrun et al. 2005, table 8.3).
 
 use crate::params::Recovery;
+use serde::{Deserialize, Serialize};
 
 /// The two averages.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Averages {
     slow: f64,
     fast: f64,
@@ -31,6 +32,10 @@ impl Averages {
         }
         let drop = 1.0 - self.fast / self.slow - recovery.tolerance;
         drop.clamp(0.0, recovery.most_scattered)
+    }
+
+    pub(crate) fn numbers(&self) -> [f64; 2] {
+        [self.slow, self.fast]
     }
 
     /// The slow average: how well scans fit in the long run.

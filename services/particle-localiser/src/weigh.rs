@@ -6,6 +6,7 @@
 use crate::expected::{Caster, Lanes};
 use crate::field::{ByteField, LANES};
 use crate::params::{Model, Params};
+use crate::ratios::Ratios;
 use crate::{Beams, Map, Particles};
 
 /// Points of a beam that fits perfectly.
@@ -157,6 +158,14 @@ impl Weigher {
                 let worth = (self.independent_beams / beams.max(1) as f64).min(1.0);
                 f64::from(points) / full * self.nats * worth
             }
+        }
+    }
+
+    /// Likelihoods to a power, relative to that of so many points.
+    pub(crate) fn ratios(&self, best: u32, beams: usize, exponent: f64) -> Ratios {
+        match self.kind {
+            Kind::CubeField(_) => Ratios::of_sums(best, f64::from(FULL), exponent),
+            _ => Ratios::of_logs(best, self.log_likelihood(1, beams) * exponent),
         }
     }
 

@@ -4,6 +4,7 @@ use crate::expected::Caster;
 use crate::field::{ByteField, LANES};
 use crate::params::{Model, Recovery};
 use crate::random::{Purpose, Stream};
+use crate::ratios::Ratios;
 use crate::resample::comb;
 use crate::trigonometry::{sin_cos, wrap};
 use crate::{Averages, Beams, Filter, Map, Params, ParamsError, Start, kld};
@@ -198,4 +199,22 @@ fn without_a_map_nothing_is_found() {
     let mut filter = Filter::new(Params::default(), Map::empty(), 1);
     let header = RangeScan { angle_step_rad: 0.1, range_max_m: 10.0, ..RangeScan::default() };
     assert_eq!(filter.correct(&Beams::select(&header, &[1.0, 2.0], 8.0, 9)), None);
+}
+
+#[track_caller]
+fn check_ratios(ratios: &Ratios, likelihood: impl Fn(f64) -> f64) {
+    for points in (0..=40_000).step_by(37) {
+        let expected = likelihood(f64::from(points)) / likelihood(40_000.0);
+        let ratio = ratios.of(points);
+        assert!((ratio - expected).abs() <= 1e-12 * expected.max(1e-280), "{points}: {ratio} for {expected}");
+    }
+    assert_eq!(ratios.of(40_000), 1.0);
+}
+
+#[test]
+fn ratios_are_likelihoods() {
+    check_ratios(&Ratios::of_logs(40_000, 3e-4), |points| (3e-4 * points).exp());
+    check_ratios(&Ratios::of_logs(40_000, 0.01), |points| (0.01 * (points - 40_000.0)).exp());
+    check_ratios(&Ratios::of_sums(40_000, 255.0, 1.0), |points| 255.0 + points);
+    check_ratios(&Ratios::of_sums(40_000, 255.0, 0.3), |points| (255.0 + points).powf(0.3));
 }
