@@ -4,8 +4,8 @@ use crate::arena::{Manoeuvre, View, driving_room_m, escape, manoeuvre, turning_r
 use crate::{Executive, Inputs, resolve};
 use geometry::{Point2, Pose2, angle};
 use messages::{
-    FixedText, JourneyStageName, MotionCommand, MotionKindName, MotionStateName, PlanRequest,
-    PlanStateName, SonarCommand, SonarModeName, Time,
+    FixedText, JourneyStageName, MotionCommand, MotionKindName, MotionStateName, PlanRequest, PlanStateName,
+    SonarCommand, SonarModeName, Time,
 };
 use std::collections::VecDeque;
 use std::f64::consts::FRAC_PI_2;
@@ -176,9 +176,8 @@ impl Executive {
         let faces_first = range_m >= self.params.face_wall_from_m;
         turns[usize::from(faces_first)..].sort_by(|a, b| a.abs().total_cmp(&b.abs()));
         self.seen_at = self.belief.map_or(Pose2::IDENTITY, |belief| belief.pose);
-        let has_room = |turn_rad: &f64| {
-            turning_room_m(&self.views(), 0.0, *turn_rad) >= self.params.turn_margin_m
-        };
+        let has_room =
+            |turn_rad: &f64| turning_room_m(&self.views(), 0.0, *turn_rad) >= self.params.turn_margin_m;
         match turns.into_iter().find(has_room) {
             Some(turn_rad) => {
                 let window_rad = angle::difference(bearing_rad, turn_rad);

@@ -135,7 +135,9 @@ pub enum ParamsError {
         target: String,
     },
     /// No random place lies far enough from the walls.
-    #[error("the world {world:?} has no outline with room target_clearance_m = {clearance_m} from its walls; lower it")]
+    #[error(
+        "the world {world:?} has no outline with room target_clearance_m = {clearance_m} from its walls; lower it"
+    )]
     NoRandomTarget {
         /// The world file.
         world: String,

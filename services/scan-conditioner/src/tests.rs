@@ -83,7 +83,8 @@ fn step(ranges: &[f32], order: &SonarCommand) -> (messages::WallSurvey, Option<V
 #[test]
 fn four_windows_of_31_readings_are_kept() {
     let ranges = room([0.2, 0.5, 0.7, 0.6], 0.0);
-    let (survey, scan) = step(&ranges, &SonarCommand { command_id: 7, measure: 1, ..SonarCommand::default() });
+    let (survey, scan) =
+        step(&ranges, &SonarCommand { command_id: 7, measure: 1, ..SonarCommand::default() });
     let kept = scan.expect("a scan to localise by");
     assert_eq!((survey.command_id, survey.readings, survey.kept_windows), (7, 124, 0b1111));
     for (index, range_m) in kept.iter().enumerate() {

@@ -20,7 +20,8 @@ pub fn windows(ring: &Ring, first_rad: f64, params: &Params) -> [Window; 4] {
     [0, 1, 2, 3].map(|quarter| {
         let centre = ring.index_at(first_rad + f64::from(quarter) * FRAC_PI_2);
         let half = ring.span(params.window_deg.to_radians());
-        let is_kept = quarter == 0 || !params.perpendicular_only || is_perpendicular(ring, centre, half, params);
+        let is_kept =
+            quarter == 0 || !params.perpendicular_only || is_perpendicular(ring, centre, half, params);
         Window { centre, half, is_kept }
     })
 }

@@ -61,7 +61,9 @@ fn draw(file: &Path, world: &World, pose: Pose2) -> Result<(), Box<dyn Error>> {
     map.configure_mesh().light_line_style(TRANSPARENT).x_desc("x [m]").y_desc("y [m]").draw()?;
     let walls = world.wall_segments(0);
     map.draw_series(
-        walls.iter().map(|wall| PathElement::new([(wall.a.x, wall.a.y), (wall.b.x, wall.b.y)], RED.stroke_width(2))),
+        walls
+            .iter()
+            .map(|wall| PathElement::new([(wall.a.x, wall.a.y), (wall.b.x, wall.b.y)], RED.stroke_width(2))),
     )?;
     let lines = geometry::Walls::new(walls);
     let hits = (0..360).step_by(3).filter_map(|degree| {

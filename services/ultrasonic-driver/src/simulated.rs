@@ -38,12 +38,7 @@ impl SimulatedSonar {
 
     /// The same in a world that is at hand already.
     pub fn in_world(params: Params, world: &World, seed: u64) -> Self {
-        Self {
-            surroundings: Surroundings::new(world),
-            rng: Pcg64::seed_from_u64(seed),
-            seen: None,
-            params,
-        }
+        Self { surroundings: Surroundings::new(world), rng: Pcg64::seed_from_u64(seed), seen: None, params }
     }
 
     /// Pings from a pose of the sensor.
