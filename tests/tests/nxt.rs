@@ -33,8 +33,11 @@ fn random_pairs_in_three_arenas() {
 #[test]
 fn the_third_arena_is_seen_to_repeat_itself_and_is_resolved_by_moving() {
     let graph = Graph::load("nxt").set("graph.defaults.world", "../worlds/arena-3.toml");
-    let run =
-        graph.set("simulator.random_start", false).set("executive.random_target", false).seed(1).run_in_lockstep();
+    let run = graph
+        .set("simulator.random_start", false)
+        .set("executive.random_target", false)
+        .seed(1)
+        .run_in_lockstep();
     assert_eq!(run["run"]["passed"], true, "{run:#}");
     assert!(figure(&run, "ambiguous scans") >= 1.0, "{run:#}");
     assert_eq!(figure(&run, "wrong locations"), 0.0, "{run:#}");
@@ -45,7 +48,8 @@ fn the_third_arena_is_seen_to_repeat_itself_and_is_resolved_by_moving() {
 #[test]
 fn errors_as_in_botsim() {
     let graph = Graph::load("nxt").set("ultrasonic-driver.noise", "botsim");
-    let graph = graph.set("simulator.motion_errors", "proportional").set("localiser.cone_half_width_rad", 0.0);
+    let graph =
+        graph.set("simulator.motion_errors", "proportional").set("localiser.cone_half_width_rad", 0.0);
     let run = graph.seed(3).run_in_lockstep();
     assert_eq!(run["run"]["passed"], true, "{run:#}");
 }

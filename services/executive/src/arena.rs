@@ -201,7 +201,8 @@ pub(crate) fn escape(views: &[View<'_>]) -> Option<(f64, f64)> {
             .map(|view| View { pose: view.pose.compose(Pose2::new(0.0, 0.0, turn_rad)), ..*view })
             .collect();
         let on_the_way_m = turning_room_m(views, 0.0, turn_rad).min(driving_room_m(&turned, way_m));
-        let there_m = turned.iter().map(|view| view.arena.room_m(view.pose.compose(Pose2::new(way_m, 0.0, 0.0))));
+        let there_m =
+            turned.iter().map(|view| view.arena.room_m(view.pose.compose(Pose2::new(way_m, 0.0, 0.0))));
         (on_the_way_m >= NO_ROOM_M).then(|| there_m.fold(f64::INFINITY, f64::min))
     };
     let free = ways.filter_map(|way| Some((way, room_m(way)?)));
@@ -267,7 +268,9 @@ impl Arena {
             return None;
         }
         let mut best = (direct_room_m.min(margin_m), (place - pose.position()).norm(), None);
-        for (reach_m, step) in APPROACH_M.into_iter().flat_map(|reach_m| (0..APPROACHES).map(move |step| (reach_m, step))) {
+        for (reach_m, step) in
+            APPROACH_M.into_iter().flat_map(|reach_m| (0..APPROACHES).map(move |step| (reach_m, step)))
+        {
             let heading_rad = f64::from(step) / f64::from(APPROACHES) * std::f64::consts::TAU;
             let begin = Pose2::new(place.x, place.y, heading_rad).compose(Pose2::new(-reach_m, 0.0, 0.0));
             if self.free_m(begin.position()) < APPROACH_ROOM_M {

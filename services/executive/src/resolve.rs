@@ -146,7 +146,8 @@ fn difference(arena: &Arena, hypotheses: &[Hypothesis], total: f64, seen: Point2
     let Some(first) = hypotheses.first() else { return 0.0 };
     let place = first.pose.transform(seen);
     // The robot will turn to the nearest wall.
-    let nearest = arena.walls().segments().iter().min_by(|a, b| a.distance_m(place).total_cmp(&b.distance_m(place)));
+    let nearest =
+        arena.walls().segments().iter().min_by(|a, b| a.distance_m(place).total_cmp(&b.distance_m(place)));
     let Some(nearest) = nearest else { return 0.0 };
     let to_wall = nearest.closest_point(place) - place;
     let aligned_rad = to_wall.y.atan2(to_wall.x) - first.pose.heading_rad;

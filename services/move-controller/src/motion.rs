@@ -17,7 +17,9 @@ const NO_RETREAT_M: f64 = 0.002;
 pub(crate) enum Phase {
     Running,
     /// Back from a wall, so far.
-    Retreating { by_m: f64 },
+    Retreating {
+        by_m: f64,
+    },
     Ended(MotionStateName),
 }
 
@@ -64,8 +66,7 @@ impl Motion {
 
     /// Counts how far the wheels have gone.
     pub(crate) fn follow(&mut self, last: &Odometry, now: &Odometry) {
-        let way_m =
-            0.5 * (now.left_travel_m - last.left_travel_m + now.right_travel_m - last.right_travel_m);
+        let way_m = 0.5 * (now.left_travel_m - last.left_travel_m + now.right_travel_m - last.right_travel_m);
         self.turned_rad += angle::difference(now.heading_rad, last.heading_rad);
         match self.phase {
             Phase::Retreating { .. } => self.retreated_m -= way_m,
@@ -129,7 +130,8 @@ impl Motion {
                 WheelSpeeds { left_mps: -rim_mps, right_mps: rim_mps }
             }
             MotionKindName::Move => {
-                let cruise_mps = if is_forward { params.approach_mps(ahead) } else { params.retreat_speed_mps };
+                let cruise_mps =
+                    if is_forward { params.approach_mps(ahead) } else { params.retreat_speed_mps };
                 let speed_mps = cruise_mps.min(params.braking_mps(left.abs())).copysign(left);
                 WheelSpeeds { left_mps: speed_mps, right_mps: speed_mps }
             }

@@ -26,7 +26,8 @@ impl Robot {
     fn step(&mut self, command: &MotionCommand) -> MotionReport {
         self.now_ms += 10;
         let now = Time::from_nanos(self.now_ms * 1_000_000);
-        let WheelSpeeds { left_mps, right_mps } = if self.wheels_turn { self.told[0] } else { WheelSpeeds::ZERO };
+        let WheelSpeeds { left_mps, right_mps } =
+            if self.wheels_turn { self.told[0] } else { WheelSpeeds::ZERO };
         let (forward_mps, turn_rad_per_s) = (0.5 * (left_mps + right_mps), (right_mps - left_mps) / 0.12);
         let odometry = &mut self.odometry;
         (odometry.forward_mps, odometry.turn_rad_per_s) = (forward_mps, turn_rad_per_s);

@@ -64,7 +64,8 @@ impl ProximityGuard {
                     (GuardReasonName::SensorFault, 0)
                 }
                 Some(distance_m) => {
-                    if self.seen.replace((ahead.stamp, ahead.sequence)) != Some((ahead.stamp, ahead.sequence)) {
+                    if self.seen.replace((ahead.stamp, ahead.sequence)) != Some((ahead.stamp, ahead.sequence))
+                    {
                         self.readings_m.rotate_right(1);
                         self.readings_m[0] = Some(distance_m);
                     }

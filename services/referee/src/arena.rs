@@ -109,8 +109,8 @@ impl ArenaRun {
         if let (true, Some(truth), Some(location)) = (is_news, self.pose, certain) {
             let place = Point2::new(location.x_m, location.y_m);
             let turn_rad = angle::difference(location.heading_rad, truth.heading_rad);
-            let right =
-                (place - truth.position()).norm() <= params.wrong_pose_m && turn_rad.abs() <= WRONG_HEADING_RAD;
+            let right = (place - truth.position()).norm() <= params.wrong_pose_m
+                && turn_rad.abs() <= WRONG_HEADING_RAD;
             self.judged += 1;
             self.wrong += u64::from(!right);
             self.first_right.get_or_insert((right, journey.ambiguous + 1));
@@ -158,9 +158,9 @@ impl ArenaRun {
         summary.push("shortest path", 100.0 * self.shortest_m, "cm");
         summary.push("least clearance", 100.0 * self.least_room_m, "cm");
         summary.push("scans", self.journey.scans as f64, "");
-        let (right, scans) = self.first_right.map_or((f64::NAN, f64::NAN), |(right, scans)| {
-            (f64::from(u8::from(right)), scans as f64)
-        });
+        let (right, scans) = self
+            .first_right
+            .map_or((f64::NAN, f64::NAN), |(right, scans)| (f64::from(u8::from(right)), scans as f64));
         summary.push("first location right", right, "");
         summary.push("scans until the first location", scans, "");
         summary.push("ambiguous scans", self.journey.ambiguous as f64, "");

@@ -19,8 +19,8 @@ use arena::ArenaRun;
 use delivery::{Delivery, Ruling};
 use geometry::{Point2, World};
 use messages::{
-    AppliedWheels, Clearance, FixedText, JourneyStatus, MissionStatus, Parameters, PoseEstimate, RunState, RunSummary,
-    Stamped, Time, TruePose, WorldTruth,
+    AppliedWheels, Clearance, FixedText, JourneyStatus, MissionStatus, Parameters, PoseEstimate, RunState,
+    RunSummary, Stamped, Time, TruePose, WorldTruth,
 };
 
 /// After the last true pose, poses that answer the last readings may still arrive for so long.

@@ -44,10 +44,7 @@ pub fn shortest_m(outline: &Polygon, offset_m: f64, from: Point2<f64>, to: Point
             let length_m = best_m[here] + (points[there] - points[here]).norm();
             let is_end = here < 2 || there < 2;
             let needed_m = if is_end { needed_m } else { offset_m - SLACK_M };
-            if !done[there]
-                && length_m < best_m[there]
-                && is_free(points[here], points[there], needed_m)
-            {
+            if !done[there] && length_m < best_m[there] && is_free(points[here], points[there], needed_m) {
                 best_m[there] = length_m;
             }
         }

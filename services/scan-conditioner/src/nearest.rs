@@ -28,12 +28,11 @@ pub fn nearest(ring: &Ring, params: &Params) -> Option<(f64, f64)> {
 /// Mean squared difference between the readings on both sides of a direction.
 fn asymmetry(ring: &Ring, index: usize, params: &Params) -> f64 {
     let reach = ring.span(params.mirror_deg.to_radians()).max(1) as isize;
-    let differences = (1..=reach).map(|offset| {
-        match (ring.beside_m(index, offset), ring.beside_m(index, -offset)) {
+    let differences =
+        (1..=reach).map(|offset| match (ring.beside_m(index, offset), ring.beside_m(index, -offset)) {
             (Some(left_m), Some(right_m)) => (left_m - right_m).abs().min(MOST_DIFFERENCE_M),
             (None, None) => 0.0,
             _ => MOST_DIFFERENCE_M,
-        }
-    });
+        });
     differences.map(|difference| difference * difference).sum::<f64>() / reach as f64
 }

@@ -23,7 +23,8 @@ impl Ring {
     pub fn of_scan(scan: &RangeScan, ranges: &[f32]) -> Option<Self> {
         scan.check().ok()?;
         let around = scan.angle_step_rad.abs() * ranges.len() as f64;
-        if !(FEWEST..=MOST).contains(&ranges.len()) || (around - TAU).abs() > 1.5 * scan.angle_step_rad.abs() {
+        if !(FEWEST..=MOST).contains(&ranges.len()) || (around - TAU).abs() > 1.5 * scan.angle_step_rad.abs()
+        {
             return None;
         }
         let ranges_m = (0..ranges.len()).map(|index| scan.beam(ranges, index).map(|(_, range_m)| range_m));

@@ -165,7 +165,8 @@ impl Simulator {
         // A stream of its own: what happens later does not depend on how often a pose was refused.
         let mut rng = Pcg64::seed_from_u64(seed ^ START_STREAM);
         for _ in 0..TRIES {
-            let place = outline.as_ref().and_then(|outline| outline.random_place(clearance_m, || rng.random()));
+            let place =
+                outline.as_ref().and_then(|outline| outline.random_place(clearance_m, || rng.random()));
             let Some(place) = place else { break };
             let pose = Pose2::new(place.x, place.y, std::f64::consts::TAU * rng.random::<f64>());
             if !self.touched(pose, RELEASE_M) {

@@ -138,8 +138,9 @@ proptest! {
 
 #[test]
 fn random_places_keep_away_from_the_boundary() {
-    let polygon = Polygon::from_coordinates(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]])
-        .expect("an L");
+    let polygon =
+        Polygon::from_coordinates(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]])
+            .expect("an L");
     let mut state = 1_u64;
     let mut uniform = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
