@@ -45,7 +45,8 @@ fn the_nearest_within_the_cone_counts() {
 
 #[test]
 fn ranges_have_limits() {
-    let near = sonar(Params { range_min_m: 0.05, ..ideal() }).measure(0, Pose2::new(0.04, 0.5, 3.14));
+    let near = sonar(Params { range_min_m: 0.05, ..ideal() })
+        .measure(0, Pose2::new(0.04, 0.5, std::f64::consts::PI));
     assert_eq!(near, Reading::TooNear);
     let far = Params { range_max_m: 1.2, half_cone_deg: 0.0, ..ideal() };
     assert_eq!(sonar(far).measure(0, Pose2::new(0.3, 0.5, 0.0)), Reading::Nothing);
