@@ -176,8 +176,12 @@ impl Executive {
         let faces_first = range_m >= self.params.face_wall_from_m;
         turns[usize::from(faces_first)..].sort_by(|a, b| a.abs().total_cmp(&b.abs()));
         self.seen_at = self.belief.map_or(Pose2::IDENTITY, |belief| belief.pose);
-        let has_room =
-            |turn_rad: &f64| turning_room_m(&self.views(), 0.0, *turn_rad) >= self.params.turn_margin_m;
+        // A scan alone shows edges of walls farther away than they are: weak echoes are late.
+        let margin_m = match self.place() {
+            Some(belief) => self.params.turn_margin_m + belief.sigma_m,
+            None => self.params.turn_margin_m + self.params.scan_margin_m,
+        };
+        let has_room = |turn_rad: &f64| turning_room_m(&self.views(), 0.0, *turn_rad) >= margin_m;
         match turns.into_iter().find(has_room) {
             Some(turn_rad) => {
                 let window_rad = angle::difference(bearing_rad, turn_rad);
@@ -375,6 +379,7 @@ impl Executive {
                     } else if first_m != 0.0 || turn_rad != 0.0 {
                         rest.push_front(motion);
                         if first_m != 0.0 {
+                            self.escapes += 1;
                             self.order(MotionKindName::Move, first_m);
                         } else {
                             self.order(MotionKindName::Turn, turn_rad);
@@ -429,7 +434,12 @@ impl Executive {
         if seen.y.atan2(seen.x).abs() < self.params.heading_tolerance_rad {
             return Manoeuvre { first_m: 0.0, turn_rad: 0.0, room_m: f64::INFINITY };
         }
-        manoeuvre(&self.views(), self.params.turn_margin_m, seen)
+        if self.escapes >= MOST_ESCAPES {
+            // It has looked for room long enough.
+            return Manoeuvre { first_m: 0.0, turn_rad: seen.y.atan2(seen.x), room_m: f64::INFINITY };
+        }
+        let error_m = self.place().map_or(self.params.scan_margin_m, |belief| belief.sigma_m);
+        manoeuvre(&self.views(), self.params.turn_margin_m + error_m, seen)
     }
 
     /// How far the robot may drive by what it has seen; beyond a short way it relies on the guard.

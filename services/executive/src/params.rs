@@ -42,6 +42,9 @@ pub struct Params {
     /// Room that is kept around the body when it turns.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub turn_margin_m: f64,
+    /// So much more where the place is not known, and only a scan shows the walls.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub scan_margin_m: f64,
     /// Room that is wanted around the body as it comes to the target.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub approach_margin_m: f64,
@@ -95,6 +98,7 @@ impl Default for Params {
             body_length_m: 0.16,
             body_width_m: 0.14,
             turn_margin_m: 0.012,
+            scan_margin_m: 0.015,
             approach_margin_m: 0.015,
             way_margin_m: 0.005,
             way_sigmas: 2.0,
@@ -170,6 +174,7 @@ impl messages::Parameters for Params {
             ("body_length_m", self.body_length_m, 0.02, 2.0),
             ("body_width_m", self.body_width_m, 0.02, 2.0),
             ("turn_margin_m", self.turn_margin_m, 0.0, 0.5),
+            ("scan_margin_m", self.scan_margin_m, 0.0, 0.5),
             ("approach_margin_m", self.approach_margin_m, 0.0, 0.5),
             ("way_margin_m", self.way_margin_m, 0.0, 0.5),
             ("way_sigmas", self.way_sigmas, 0.0, 6.0),

@@ -84,6 +84,9 @@ pub struct Params {
     /// Obstacles that were not seen for so long are forgotten.
     #[schemars(range(min = 0.5, max = 600.0))]
     pub obstacle_memory_s: f64,
+    /// Without effect, as a grid has no waypoints to draw: it is here so that the table of a sampling planner serves this one too.
+    #[schemars(range(min = 1, max = 10_000))]
+    pub samples: u32,
     /// Poses and range readings older than this are not used.
     #[schemars(range(min = 50, max = 10_000))]
     pub input_max_age_ms: u64,
@@ -117,6 +120,7 @@ impl Default for Params {
             wall_tolerance_m: 0.12,
             confirm_sightings: 2,
             obstacle_memory_s: 20.0,
+            samples: 30,
             input_max_age_ms: 500,
             period_ms: 100,
         }
@@ -199,6 +203,7 @@ impl messages::Parameters for Params {
             ("wall_tolerance_m", self.wall_tolerance_m, 0.0, 1.0),
             ("confirm_sightings", f64::from(self.confirm_sightings), 1.0, 5.0),
             ("obstacle_memory_s", self.obstacle_memory_s, 0.5, 600.0),
+            ("samples", f64::from(self.samples), 1.0, 10_000.0),
             ("input_max_age_ms", self.input_max_age_ms as f64, 50.0, 10_000.0),
             ("period_ms", self.period_ms as f64, 10.0, 1000.0),
         ];

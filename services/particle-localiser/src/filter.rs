@@ -173,7 +173,7 @@ impl Filter {
         let mut particles = Vec::with_capacity(count);
         comb(&all.weight, count, self.seed, self.epoch, |index| particles.push(all.pose(index)));
         let origin = self.map.from_own(Pose2::IDENTITY);
-        (count > 0).then(|| Belief {
+        (count > 0).then_some(Belief {
             origin: [origin.x_m, origin.y_m, origin.heading_rad],
             particles,
             spread: [self.spread.place_m, self.spread.heading_rad],

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 fn header() -> RangeScan {
-    RangeScan { angle_step_rad: DEGREE, range_max_m: 2.55, ..RangeScan::default() }
+    RangeScan { angle_step_rad: DEGREE, range_max_m: f64::from(2.55_f32), ..RangeScan::default() }
 }
 
 /// What a sensor with a cone of ±15 degrees reads in a rectangular room, by the distances of its four walls from the sensor and the
@@ -60,8 +60,10 @@ fn check_kept(ranges: &[f32], first_deg: f64, expected: [bool; 4]) {
 
 #[test]
 fn windows_look_straight_at_walls() {
-    check_kept(&room([0.2, 0.5, 0.7, 0.6], 0.0), 0.0, [true; 4]);
-    check_kept(&room([0.2, 0.5, 0.7, 0.6], 30.0), 30.0, [true; 4]);
+    check_kept(&room([0.4, 0.5, 0.55, 0.45], 0.0), 0.0, [true; 4]);
+    check_kept(&room([0.4, 0.5, 0.55, 0.45], 30.0), 30.0, [true; 4]);
+    // The wall on the right is so near that it shows at the edges of the windows beside it.
+    check_kept(&room([0.5, 0.6, 0.5, 0.15], 0.0), 0.0, [true, true, false, true]);
     // Askew by 40 degrees: the readings fall to one side. The first window stays in any case.
     check_kept(&room([0.5, 0.9, 0.7, 0.6], 40.0), 0.0, [true, false, false, false]);
     // Nothing in sight.
@@ -82,7 +84,7 @@ fn step(ranges: &[f32], order: &SonarCommand) -> (messages::WallSurvey, Option<V
 
 #[test]
 fn four_windows_of_31_readings_are_kept() {
-    let ranges = room([0.2, 0.5, 0.7, 0.6], 0.0);
+    let ranges = room([0.4, 0.5, 0.55, 0.45], 0.0);
     let (survey, scan) =
         step(&ranges, &SonarCommand { command_id: 7, measure: 1, ..SonarCommand::default() });
     let kept = scan.expect("a scan to localise by");

@@ -29,7 +29,7 @@ pub fn windows(ring: &Ring, first_rad: f64, params: &Params) -> [Window; 4] {
 /// Whether the readings have a local minimum near the middle: its third must not lie above either of the outer thirds by more than the
 /// tolerance. A window that is mostly without readings looks at nothing.
 fn is_perpendicular(ring: &Ring, centre: usize, half: usize, params: &Params) -> bool {
-    let (size, third) = (2 * half + 1, (2 * half + 1).div_ceil(3));
+    let (size, third) = (2 * half + 1, (2 * half + 1) / 3);
     let readings: Vec<Option<f64>> = ring.around(centre, half).map(|index| ring.range_m(index)).collect();
     if 2 * readings.iter().flatten().count() < size {
         return false;

@@ -68,7 +68,8 @@ fn draw(file: &Path, world: &World, pose: Pose2) -> Result<(), Box<dyn Error>> {
     let lines = geometry::Walls::new(walls);
     let hits = (0..360).step_by(3).filter_map(|degree| {
         let hit = lines.cast(pose.position(), f64::from(degree).to_radians(), 10.0)?;
-        let end: Point2<f64> = pose.transform(polar(degree, hit.range_m).into());
+        let (ahead_m, aside_m) = polar(degree, hit.range_m);
+        let end = pose.transform(Point2::new(ahead_m, aside_m));
         Some(Circle::new((end.x, end.y), 3, RGBColor(220, 170, 0).filled()))
     });
     map.draw_series(hits)?;
@@ -89,8 +90,14 @@ fn draw(file: &Path, world: &World, pose: Pose2) -> Result<(), Box<dyn Error>> {
     }
     for quarter in 0..4 {
         let arc = (-WINDOW_DEG..=WINDOW_DEG).map(|aside| polar(90 * quarter + aside, REACH_M));
-        let window = std::iter::once((0.0, 0.0)).chain(arc).chain([(0.0, 0.0)]);
-        radar.draw_series(DashedLineSeries::new(window, 4, 4, BLACK.into()))?;
+        let side = |degree: i32| (0..=30).map(move |step| polar(degree, REACH_M * f64::from(step) / 30.0));
+        let (right, left) = (side(90 * quarter - WINDOW_DEG), side(90 * quarter + WINDOW_DEG));
+        for line in [arc.collect::<Vec<_>>(), right.collect(), left.collect()] {
+            // Dotted: every other piece.
+            radar.draw_series(
+                line.windows(2).step_by(2).map(|piece| PathElement::new(piece.to_vec(), BLACK)),
+            )?;
+        }
     }
     let ideal = Params { noise: NoiseProfile::None, half_cone_deg: 0.0, ..Params::default() };
     radar.draw_series([PathElement::new(scan(world, pose, Params::default()), BLUE.stroke_width(1))])?;

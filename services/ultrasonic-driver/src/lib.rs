@@ -185,11 +185,9 @@ impl UltrasonicDriver {
             return Outputs { scan: None, ahead: None };
         }
         self.task = Task::Returning { left: count as f64, then_watch: true };
-        let header = RangeScan {
-            angle_step_rad: step_rad,
-            range_max_m: self.params.range_max_m,
-            ..RangeScan::default()
-        };
+        // As the readings have it, in single precision: "nothing" must not lie below it.
+        let range_max_m = f64::from(range_max_m as f32);
+        let header = RangeScan { angle_step_rad: step_rad, range_max_m, ..RangeScan::default() };
         Outputs { scan: Some((header, &self.ranges)), ahead: None }
     }
 }

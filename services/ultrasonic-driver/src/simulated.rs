@@ -6,6 +6,7 @@ use messages::{Stamped, Surroundings, Time, WorldTruth};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
+use std::f64::consts::FRAC_PI_2;
 use std::time::Duration;
 
 /// Without a newer truth the sensor counts as silent.
@@ -14,6 +15,10 @@ const SILENT_AFTER: Duration = Duration::from_millis(300);
 const HEIGHT_M: f64 = 0.10;
 /// No ray is followed farther, whatever the sensor can hear.
 const FARTHEST_M: f64 = 20.0;
+/// So near to a wall's end its edge is heard ...
+const EDGE_M: f64 = 0.015;
+/// ... as well as a wall at this angle of incidence.
+const EDGE_RAD: f64 = 0.35;
 /// A ray that leaves a wall begins so far from it.
 const OFF_WALL_M: f64 = 1e-6;
 
@@ -78,7 +83,9 @@ impl SimulatedSonar {
     /// wall (NXT-033, NXT-034).
     fn echo(&self, scene: &Scene, hit: Hit, ray: &Ray, noise: [f64; 2], lost: f64, late: f64) -> Option<f64> {
         let params = &self.params;
-        let incidence_rad = hit.incidence_rad();
+        // Edges and corners send sound back wherever it comes from.
+        let most_rad = if is_at_end(scene, hit, ray) { EDGE_RAD } else { FRAC_PI_2 };
+        let incidence_rad = hit.incidence_rad().min(most_rad);
         let (from_deg, to_deg) = (params.lost_from_deg, params.lost_to_deg);
         let slant = ((incidence_rad.to_degrees() - from_deg) / (to_deg - from_deg)).clamp(0.0, 1.0);
         let detour_m = if lost < slant * params.lost_share {
@@ -108,6 +115,14 @@ impl SimulatedSonar {
             Reading::Echo { range_m }
         }
     }
+}
+
+/// Whether a ray meets a wall near one of its ends.
+fn is_at_end(scene: &Scene, hit: Hit, ray: &Ray) -> bool {
+    let Surface::Wall(wall) = hit.surface else { return false };
+    let place = ray.origin + ray.direction * hit.range_m;
+    let ends = scene.walls().segments().get(wall as usize).map(|wall| [wall.a, wall.b]);
+    ends.is_some_and(|ends| ends.iter().any(|end| (place - end).norm() < EDGE_M))
 }
 
 /// How far it is from where a ray meets a wall to what it meets next, mirrored at that wall.
