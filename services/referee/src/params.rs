@@ -48,6 +48,12 @@ pub struct Params {
     /// Error that 95 % of the poses must stay below.
     #[schemars(range(min = 0.001, max = 100.0))]
     pub max_p95_m: f64,
+    /// Poses between two true poses are compared with the straight line between these; otherwise only the newest pose before each true one
+    /// counts: for logs whose true poses lie far apart, or whose time stamps say nothing.
+    pub between_truths: bool,
+    /// Median error of the heading that passes, in degrees; 180 for no bound.
+    #[schemars(range(min = 0.01, max = 180.0))]
+    pub max_median_heading_deg: f64,
     /// Length of the robot's body.
     #[schemars(range(min = 0.05, max = 2.0))]
     pub body_length_m: f64,
@@ -72,6 +78,8 @@ impl Default for Params {
             fault_limit_s: 10.0,
             max_median_m: 0.25,
             max_p95_m: 0.8,
+            between_truths: true,
+            max_median_heading_deg: 180.0,
             body_length_m: 0.61,
             body_width_m: 0.51,
             body_height_m: 1.0,
@@ -126,6 +134,7 @@ impl messages::Parameters for Params {
         within("fault_limit_s", self.fault_limit_s, 0.0, 1000.0)?;
         within("max_median_m", self.max_median_m, 0.001, 100.0)?;
         within("max_p95_m", self.max_p95_m, 0.001, 100.0)?;
+        within("max_median_heading_deg", self.max_median_heading_deg, 0.01, 180.0)?;
         within("body_length_m", self.body_length_m, 0.05, 2.0)?;
         within("body_width_m", self.body_width_m, 0.05, 2.0)?;
         within("body_height_m", self.body_height_m, 0.05, 3.0)?;
