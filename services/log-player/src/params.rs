@@ -47,8 +47,8 @@ impl Scans {
     pub fn plays(self, number: usize) -> bool {
         match self {
             Self::All => true,
-            Self::Even => number % 2 == 0,
-            Self::Odd => number % 2 == 1,
+            Self::Even => number.is_multiple_of(2),
+            Self::Odd => !number.is_multiple_of(2),
         }
     }
 }

@@ -32,8 +32,9 @@ fn picture(name: &str, drive: &Drive) -> String {
         (least(|pose| pose.x_m), most(|pose| pose.x_m), least(|pose| pose.y_m), most(|pose| pose.y_m));
     let (error_m, error_deg) = run.quantile(0.5);
     let mut svg = format!(
-        "<svg xmlns='http://www.w3.org/2000/svg' width='900' viewBox='{left:.2} {:.2} {:.2} {:.2}'>\n\
+        "<svg xmlns='http://www.w3.org/2000/svg' width='900' height='{:.0}' viewBox='{left:.2} {:.2} {:.2} {:.2}'>\n\
          <rect x='{left:.2}' y='{:.2}' width='100%' height='100%' fill='white'/>\n",
+        900.0 * (high - low + 2.0) / (right - left),
         -high - 2.0,
         right - left,
         high - low + 2.0,
@@ -49,8 +50,8 @@ fn picture(name: &str, drive: &Drive) -> String {
         }
     }
     svg += "'/>\n";
-    svg += &line("#3b82c4", 0.16, truth.iter().map(Pose2::position));
-    svg += &line("#e8590c", 0.05, run.estimates.iter().map(Pose2::position));
+    svg += &line("#3b82c4", 0.16, truth.iter().map(|pose| pose.position()));
+    svg += &line("#e8590c", 0.05, run.estimates.iter().map(|pose| pose.position()));
     let _ = writeln!(
         svg,
         "<text x='{:.2}' y='{:.2}' font-size='{:.2}' font-family='sans-serif'>{name}: truth blue, estimate orange; median {error_m:.3} m, \

@@ -146,10 +146,8 @@ impl Comparison {
                 return;
             }
             self.truths.pop_front();
-            let mut newest = None;
-            while let Some((_, place, floor)) = self.waiting.pop_front_if(|(stamp, ..)| *stamp <= moment) {
-                newest = Some((place, floor));
-            }
+            let before = self.waiting.iter().take_while(|(stamp, ..)| *stamp <= moment).count();
+            let newest = self.waiting.drain(..before).next_back().map(|(_, place, floor)| (place, floor));
             if let Some(pose) = newest {
                 self.judge(pose, (truth, true_floor));
             }
