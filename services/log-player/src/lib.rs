@@ -15,11 +15,14 @@ mod tests;
 pub use carmen::read as read_carmen;
 pub use files::{LoadError, load};
 pub use log::{Entry, Fault, Log, PROBLEM_LIMIT, Problem, Record};
-pub use params::{AnchorPlace, Format, Params, ParamsError, Pose, Timing};
+pub use params::{AnchorPlace, Format, Params, ParamsError, Pose, Scans, Timing};
 pub use steps::read as read_steps;
 
 use geometry::Pose2;
-use messages::{ANCHOR_CAPACITY, AnchorRange, Odometry, Parameters, RangeScan, TagRanges, Time, TruePose};
+use messages::{
+    ANCHOR_CAPACITY, AnchorRange, LocationStateName, Odometry, Parameters, PoseEstimate, RangeScan,
+    TagRanges, Time, TruePose,
+};
 use std::time::Duration;
 
 /// A message of the log.
@@ -54,7 +57,8 @@ impl LogPlayer {
     /// When the parameters make no sense.
     pub fn new(params: &Params, log: Log) -> Result<Self, ParamsError> {
         params.check()?;
-        let Log { entries, mut problems, mut problem_count } = log;
+        let Log { mut entries, mut problems, mut problem_count } = log;
+        leave_out(&mut entries, params);
         let mut unknown: Vec<u32> = Vec::new();
         let mut writer = Writer::new(params);
         let last_truth = entries.iter().rposition(|entry| matches!(entry.record, Record::Truth(_)));
@@ -106,6 +110,41 @@ impl LogPlayer {
     /// How much of the log could not be played.
     pub fn problem_count(&self) -> usize {
         self.problem_count
+    }
+}
+
+/// Takes away the scans that are not to be played and, where a log holds the truth of each scan beside it, that. A truth that stands in for
+/// a localiser's pose comes at once with its scan.
+fn leave_out(entries: &mut Vec<Entry>, params: &Params) {
+    let (mut number, mut plays, mut scan_s) = (0, true, 0.0);
+    let has_own_truth = params.format == Format::Carmen;
+    entries.retain_mut(|entry| match entry.record {
+        Record::Scan { .. } => {
+            plays = params.scans.plays(number);
+            number += 1;
+            scan_s = entry.at_s;
+            plays
+        }
+        Record::Truth(_) if has_own_truth => {
+            if params.truth_as_location {
+                entry.at_s = scan_s;
+            }
+            plays
+        }
+        _ => true,
+    });
+}
+
+/// Where a localiser that knows the truth says that the robot is.
+pub fn located(truth: &TruePose) -> PoseEstimate {
+    PoseEstimate {
+        x_m: truth.x_m,
+        y_m: truth.y_m,
+        heading_rad: truth.heading_rad,
+        covariance: [0.0; 9],
+        floor: truth.floor,
+        state: LocationStateName::Tracking.into(),
+        ..PoseEstimate::default()
     }
 }
 

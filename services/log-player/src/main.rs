@@ -1,6 +1,6 @@
 //! The process around `log_player`.
-use log_player::{Due, LogPlayer, Params, load};
-use messages::{Odometry, RangeScan, TagRanges, TruePose};
+use log_player::{Due, LogPlayer, Params, load, located};
+use messages::{Odometry, PoseEstimate, RangeScan, TagRanges, TruePose};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -9,6 +9,10 @@ fn main() -> ExitCode {
         let mut tag = node.publisher::<TagRanges>("tag/ranges")?;
         let mut scan = node.publisher::<RangeScan>("laser/scan")?;
         let mut truth = node.publisher::<TruePose>("truth/pose")?;
+        let mut location = match params.truth_as_location {
+            true => Some(node.publisher::<PoseEstimate>("location/pose")?),
+            false => None,
+        };
         node.every(params.tick());
         let mut player = LogPlayer::new(&params, load(&params)?)?;
         for problem in player.problems() {
@@ -20,7 +24,12 @@ fn main() -> ExitCode {
                     Due::Odometry(message) => odometry.publish(message),
                     Due::Tag(message) => tag.publish(message),
                     Due::Scan(header, ranges_m) => scan.publish_with(header, ranges_m),
-                    Due::Truth(message) => truth.publish(message),
+                    Due::Truth(message) => {
+                        truth.publish(message);
+                        if let Some(location) = &mut location {
+                            location.publish(&located(message));
+                        }
+                    }
                 }
             }
         })

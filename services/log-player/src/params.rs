@@ -29,6 +29,30 @@ pub enum Timing {
     Order,
 }
 
+/// Which scans of a log are played.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scans {
+    /// All of them.
+    #[default]
+    All,
+    /// The first, the third, and so on (numbers 0, 2, ..): to make a map of.
+    Even,
+    /// The second, the fourth, and so on (numbers 1, 3, ..): to be localised on that map.
+    Odd,
+}
+
+impl Scans {
+    /// Whether the scan of this number, counted from 0, is played.
+    pub fn plays(self, number: usize) -> bool {
+        match self {
+            Self::All => true,
+            Self::Even => number.is_multiple_of(2),
+            Self::Odd => !number.is_multiple_of(2),
+        }
+    }
+}
+
 /// What `log-player` can be told.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -42,6 +66,10 @@ pub struct Params {
     /// Row k of the true poses belongs to step k plus this.
     #[schemars(range(min = 0, max = 1000))]
     pub truth_step_offset: u32,
+    /// Which scans are played; in a CARMEN log the true pose of a scan goes with it.
+    pub scans: Scans,
+    /// Publishes the true poses as `location/pose` too, in the place of a localiser: to make a map.
+    pub truth_as_location: bool,
     /// How many times faster than it was recorded.
     #[schemars(range(min = 0.001, max = 100000.0))]
     pub speed: f64,
@@ -101,6 +129,8 @@ impl Default for Params {
             format: Format::Steps,
             truth: String::new(),
             truth_step_offset: 1,
+            scans: Scans::All,
+            truth_as_location: false,
             speed: 1.0,
             timing: Timing::Auto,
             period_s: 1.05,

@@ -313,3 +313,26 @@ proptest::proptest! {
         let _ = steps(&String::from_utf8_lossy(&text));
     }
 }
+
+/// Two scans, each with its truth, and what is played of them.
+#[track_caller]
+fn check_scans(scans: Scans, expected: &str) {
+    let params = Params { format: Format::Carmen, scans, start_delay_s: 0.0, ..Params::default() };
+    let mut player = LogPlayer::new(&params, read_carmen(&CARMEN.repeat(2), Timing::Order, 1.0)).unwrap();
+    player.step(Time::from_nanos(1));
+    assert_eq!(kinds(player.step(Time::from_secs_f64(100.0))), expected);
+}
+
+#[test]
+fn scans_are_played_with_their_truth() {
+    check_scans(Scans::All, "sToosLo");
+    check_scans(Scans::Even, "sLooo");
+    check_scans(Scans::Odd, "oosLo");
+}
+
+#[test]
+fn the_truth_can_stand_in_for_a_localiser() {
+    let truth = TruePose { x_m: 1.0, y_m: 2.0, heading_rad: 0.5, floor: 3, is_last: 0 };
+    let pose = located(&truth);
+    assert_eq!((pose.pose().unwrap(), pose.floor), (Pose2::new(1.0, 2.0, 0.5), 3));
+}

@@ -134,11 +134,36 @@ fn meet(lines: &[Line], block: &Block, du: &Lanes, dv: &Lanes, ranges: &mut Lane
     }
 }
 
-/// From a step into a wall's cell, at most half a cell too far, to the cell's middle, which is where the map's wall is on average.
-const INTO_WALL: f32 = 0.25;
+/// From the edge of a wall's cell to its middle, which is where the map's wall is on average.
+const INTO_WALL: f32 = 0.5;
+
+/// Of rays that ended after `along` cells: the exact range to the edge of the cell in which they did, and into the wall; in metres.
+#[inline(always)]
+fn arrive(
+    block: &Block,
+    du: &Lanes,
+    dv: &Lanes,
+    along: &Lanes,
+    [per_metre, most_m]: [f32; 2],
+    ranges: &mut Lanes,
+) {
+    // Where a ray crosses the edge of its last cell that it met first on one axis.
+    let edge = |origin: f32, direction: f32, along: f32| {
+        let place = origin + direction * along;
+        let low = place as i32 as f32;
+        let edge = if direction > 0.0 { low } else { low + 1.0 };
+        if direction.abs() > 1e-6 { (edge - origin) / direction } else { 0.0 }
+    };
+    for lane in 0..LANES {
+        let met = edge(block.u[lane], du[lane], along[lane]).max(edge(block.v[lane], dv[lane], along[lane]));
+        let range_m = (met.max(0.0) + INTO_WALL) / per_metre;
+        ranges[lane] = if along[lane] < most_m * per_metre { range_m.min(most_m) } else { most_m };
+    }
+}
 
 fn trace(field: &ByteField, block: &Block, du: &Lanes, dv: &Lanes, most_m: f32, ranges: &mut Lanes) {
     let most = most_m * field.per_metre;
+    let mut ends = [0.0; LANES];
     for lane in 0..LANES {
         let mut along = 0.0;
         for _ in 0..MOST_STEPS {
@@ -148,19 +173,20 @@ fn trace(field: &ByteField, block: &Block, du: &Lanes, dv: &Lanes, most_m: f32, 
             }
             along += f32::from(step) * (1.0 / QUARTERS);
         }
-        ranges[lane] = ((along + INTO_WALL) / field.per_metre).min(most_m);
+        ends[lane] = along;
     }
+    arrive(block, du, dv, &ends, [field.per_metre, most_m], ranges);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn trace_avx2(field: &ByteField, block: &Block, du: &Lanes, dv: &Lanes, most_m: f32, ranges: &mut Lanes) {
+fn trace_avx2(field: &ByteField, block: &Block, cu: &Lanes, cv: &Lanes, most_m: f32, ranges: &mut Lanes) {
     use std::arch::x86_64::*;
     let view = field.avx2();
     // SAFETY: halves of arrays of sixteen numbers.
     let load = |lanes: &Lanes, half: usize| unsafe { _mm256_loadu_ps(lanes.as_ptr().add(8 * half)) };
     let halves = |lanes: &Lanes| [load(lanes, 0), load(lanes, 1)];
-    let (u, v, du, dv) = (halves(&block.u), halves(&block.v), halves(du), halves(dv));
+    let (u, v, du, dv) = (halves(&block.u), halves(&block.v), halves(cu), halves(cv));
     let most = _mm256_set1_ps(most_m * field.per_metre);
     let quarter = _mm256_set1_ps(1.0 / QUARTERS);
     let mut along = [_mm256_setzero_ps(); 2];
@@ -185,7 +211,5 @@ fn trace_avx2(field: &ByteField, block: &Block, du: &Lanes, dv: &Lanes, most_m: 
         // SAFETY: halves of an array of sixteen numbers.
         unsafe { _mm256_storeu_ps(lanes.as_mut_ptr().add(8 * half), along) };
     }
-    for lane in 0..LANES {
-        ranges[lane] = ((lanes[lane] + INTO_WALL) / field.per_metre).min(most_m);
-    }
+    arrive(block, cu, cv, &lanes, [field.per_metre, most_m], ranges);
 }

@@ -101,8 +101,8 @@ impl Budget {
 const FEWEST: usize = 10;
 /// Fewest candidates for the particles that are scattered to recover.
 const CANDIDATES: usize = 2000;
-/// Weight of all scattered particles together, for each unit of their share.
-const SCATTERED_PRIOR: f64 = 0.001;
+/// Weight of all scattered particles together, for each unit of their share: one scan may fit a mirrored place better by chance, several may not.
+const SCATTERED_PRIOR: f64 = 1e-6;
 /// From one pass to the next the spread shrinks to this.
 const SHRINK: f64 = 0.6;
 /// Directions at one place among scattered particles, which sets how far apart the places are.

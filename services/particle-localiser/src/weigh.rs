@@ -144,6 +144,28 @@ impl Weigher {
         });
     }
 
+    /// What each particle's sensor is expected to read along each beam, particle by particle; nothing for the models that expect no ranges.
+    pub fn expected_ranges(&self, particles: &Particles, beams: &Beams) -> Vec<f32> {
+        let (Kind::Beam { caster, .. } | Kind::Gaussian { caster, .. }) = &self.kind else {
+            return Vec::new();
+        };
+        let scan = Scan::new(self, beams);
+        let mut expected = vec![0.0; particles.len() * beams.len()];
+        for first in (0..particles.len()).step_by(LANES) {
+            let last = (first + LANES).min(particles.len());
+            let poses =
+                [&particles.x[first..last], &particles.y[first..last], &particles.heading[first..last]];
+            let mut points = [0; LANES];
+            let keep = std::cell::RefCell::new(&mut expected);
+            self.expect(caster, poses, beams, &scan, &mut points[..last - first], |beam, ranges, _| {
+                for (lane, range_m) in ranges.iter().enumerate().take(last - first) {
+                    keep.borrow_mut()[(first + lane) * beams.len() + beam] = *range_m;
+                }
+            });
+        }
+        expected
+    }
+
     /// How well so many points of so many beams fit: 0 to 1.
     pub fn fit(points: f64, beams: usize) -> f64 {
         points / (f64::from(FULL) * beams.max(1) as f64)

@@ -77,7 +77,7 @@ impl Delivery {
             halts: Vec::new(),
             fault_since: None,
             fault: String::new(),
-            comparison: Comparison::new(),
+            comparison: Comparison::new(params.between_truths),
         }
     }
 
@@ -114,7 +114,7 @@ impl Delivery {
             return;
         }
         let place = pose.position();
-        self.comparison.truth(truth.stamp, place, truth.floor);
+        self.comparison.truth(truth.stamp, pose, truth.floor);
         if let Some((last, floor)) = self.last_place.replace((place, truth.floor))
             && floor == truth.floor
         {

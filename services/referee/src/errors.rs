@@ -1,6 +1,6 @@
 //! Errors of a localisation: poses against the truth of the same moment, and their quantiles.
 
-use geometry::Point2;
+use geometry::{Pose2, angle};
 use messages::{PoseEstimate, Stamped, Time};
 use std::collections::VecDeque;
 
@@ -59,18 +59,24 @@ impl Errors {
 #[derive(Debug, Clone)]
 pub(crate) struct Comparison {
     pub(crate) errors: Errors,
+    /// The same of headings, in degrees where places have metres.
+    pub(crate) turns: Errors,
+    /// Whether poses between two truths count; otherwise only the newest before each truth.
+    between: bool,
     pub(crate) accepted: u64,
     pub(crate) rejected: u64,
     pub(crate) wrong_floor: u64,
-    truths: VecDeque<(Time, Point2<f64>, i32)>,
-    waiting: VecDeque<(Time, Point2<f64>, i32)>,
+    truths: VecDeque<(Time, Pose2, i32)>,
+    waiting: VecDeque<(Time, Pose2, i32)>,
     newest_pose: Option<(Time, u64)>,
 }
 
 impl Comparison {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(between: bool) -> Self {
         Self {
             errors: Errors::new(),
+            turns: Errors::new(),
+            between,
             accepted: 0,
             rejected: 0,
             wrong_floor: 0,
@@ -81,9 +87,9 @@ impl Comparison {
     }
 
     /// The truth at a moment. Places that are none, and moments that do not come after the last, are left out.
-    pub(crate) fn truth(&mut self, stamp: Time, place: Point2<f64>, floor: i32) {
+    pub(crate) fn truth(&mut self, stamp: Time, place: Pose2, floor: i32) {
         let is_newer = self.truths.back().is_none_or(|(last, ..)| stamp > *last);
-        if is_newer && place.x.is_finite() && place.y.is_finite() {
+        if is_newer && place.is_finite() {
             self.truths.push_back((stamp, place, floor));
             if self.truths.len() > REMEMBERED {
                 self.truths.pop_front();
@@ -99,7 +105,7 @@ impl Comparison {
         }
         (self.accepted, self.rejected) = (estimate.accepted, estimate.rejected);
         if let Ok(pose) = estimate.pose() {
-            self.waiting.push_back((estimate.stamp, pose.position(), estimate.floor));
+            self.waiting.push_back((estimate.stamp, pose, estimate.floor));
             if self.waiting.len() > REMEMBERED {
                 self.waiting.pop_front();
             }
@@ -108,22 +114,48 @@ impl Comparison {
 
     /// Judges the poses whose moment the truth has reached; all that wait when the truth has ended.
     pub(crate) fn settle(&mut self, truth_ended: bool) {
+        if !self.between {
+            return self.settle_each_truth(truth_ended);
+        }
         while let Some(&(stamp, place, floor)) = self.waiting.front() {
             let Some(&(newest, ..)) = self.truths.back() else { return };
             if stamp > newest && !truth_ended {
                 return;
             }
             self.waiting.pop_front();
-            match self.truth_at(stamp) {
-                Some((_, true_floor)) if true_floor != floor => self.wrong_floor += 1,
-                Some((true_place, _)) => self.errors.add((place - true_place).norm()),
-                None => {}
+            if let Some(truth) = self.truth_at(stamp) {
+                self.judge((place, floor), truth);
+            }
+        }
+    }
+
+    fn judge(&mut self, (place, floor): (Pose2, i32), (truth, true_floor): (Pose2, i32)) {
+        if floor != true_floor {
+            self.wrong_floor += 1;
+            return;
+        }
+        let turn_rad = angle::difference(place.heading_rad, truth.heading_rad);
+        self.errors.add(place.distance_m(truth));
+        self.turns.add(turn_rad.abs().to_degrees());
+    }
+
+    /// Each truth against the newest pose before it, as soon as a later pose shows that there will be no newer one.
+    fn settle_each_truth(&mut self, truth_ended: bool) {
+        while let Some(&(moment, truth, true_floor)) = self.truths.front() {
+            if !truth_ended && self.waiting.back().is_none_or(|(stamp, ..)| *stamp <= moment) {
+                return;
+            }
+            self.truths.pop_front();
+            let before = self.waiting.iter().take_while(|(stamp, ..)| *stamp <= moment).count();
+            let newest = self.waiting.drain(..before).next_back().map(|(_, place, floor)| (place, floor));
+            if let Some(pose) = newest {
+                self.judge(pose, (truth, true_floor));
             }
         }
     }
 
     /// Between the two truths around a moment, along a straight line.
-    fn truth_at(&self, stamp: Time) -> Option<(Point2<f64>, i32)> {
+    fn truth_at(&self, stamp: Time) -> Option<(Pose2, i32)> {
         let after = self.truths.iter().position(|(moment, ..)| *moment >= stamp);
         let Some(after) = after else {
             // Just after the last truth, as the poses that answer a log's last readings are.
@@ -137,6 +169,11 @@ impl Comparison {
         let &(last_moment, last, _) = self.truths.get(after.checked_sub(1)?)?;
         let gap_s = next_moment.seconds_since(last_moment);
         let share = stamp.seconds_since(last_moment) / gap_s;
-        (gap_s <= LONGEST_GAP_S).then(|| (last + (next - last) * share, floor))
+        let turn_rad = angle::difference(next.heading_rad, last.heading_rad);
+        let between = |from: f64, to: f64| from + (to - from) * share;
+        (gap_s <= LONGEST_GAP_S).then(|| {
+            let heading_rad = angle::wrap(last.heading_rad + turn_rad * share);
+            (Pose2::new(between(last.x_m, next.x_m), between(last.y_m, next.y_m), heading_rad), floor)
+        })
     }
 }

@@ -17,7 +17,7 @@ pub use shortest::shortest_m;
 
 use arena::ArenaRun;
 use delivery::{Delivery, Ruling};
-use geometry::{Point2, World};
+use geometry::{Pose2, World};
 use messages::{
     AppliedWheels, Clearance, FixedText, JourneyStatus, MissionStatus, Parameters, PoseEstimate, RunState,
     RunSummary, Stamped, Time, TruePose, WorldTruth,
@@ -124,7 +124,7 @@ impl Referee {
             comparison.pose(location);
         }
         if let Some(truth) = inputs.true_pose {
-            comparison.truth(truth.stamp, Point2::new(truth.x_m, truth.y_m), truth.floor);
+            comparison.truth(truth.stamp, Pose2::new(truth.x_m, truth.y_m, truth.heading_rad), truth.floor);
             if truth.is_last == 1 {
                 self.log_ended.get_or_insert(now);
             }
@@ -136,14 +136,15 @@ impl Referee {
             return (RunState::Running, format!("{} poses compared", errors.count));
         }
         let (median_m, p95_m) = (errors.quantile_m(0.5), errors.quantile_m(0.95));
-        let Params { max_median_m, max_p95_m, .. } = self.params;
+        let median_deg = comparison.turns.quantile_m(0.5);
+        let Params { max_median_m, max_p95_m, max_median_heading_deg, .. } = self.params;
         // Without a single pose both are NaN, and no bound holds.
-        let passed = median_m <= max_median_m && p95_m <= max_p95_m;
+        let passed = median_m <= max_median_m && p95_m <= max_p95_m && median_deg <= max_median_heading_deg;
         let state = if passed { RunState::Passed } else { RunState::Failed };
         (
             state,
             format!(
-                "median {median_m:.3} m (bound {max_median_m} m), 95 % {p95_m:.3} m (bound {max_p95_m} m)"
+                "median {median_m:.3} m (bound {max_median_m} m), 95 % {p95_m:.3} m (bound {max_p95_m} m), {median_deg:.2} deg"
             ),
         )
     }
@@ -164,6 +165,7 @@ impl Referee {
                     if comparison.errors.count > 0 { comparison.errors.max_m } else { f64::NAN },
                     "m",
                 );
+                summary.push("heading error, median", comparison.turns.quantile_m(0.5), "deg");
                 summary.push("ranges accepted", comparison.accepted as f64, "");
                 summary.push("ranges rejected", comparison.rejected as f64, "");
                 summary.push("poses on a wrong floor", comparison.wrong_floor as f64, "");

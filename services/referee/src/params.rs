@@ -59,6 +59,12 @@ pub struct Params {
     /// A pose that is said to be certain is wrong when it is farther off than this.
     #[schemars(range(min = 0.001, max = 10.0))]
     pub wrong_pose_m: f64,
+    /// Poses between two true poses are compared with the straight line between these; otherwise only the newest pose before each true one
+    /// counts: for logs whose true poses lie far apart, or whose time stamps say nothing.
+    pub between_truths: bool,
+    /// Median error of the heading that passes, in degrees; 180 for no bound.
+    #[schemars(range(min = 0.01, max = 180.0))]
+    pub max_median_heading_deg: f64,
     /// Length of the robot's body.
     #[schemars(range(min = 0.05, max = 2.0))]
     pub body_length_m: f64,
@@ -86,6 +92,8 @@ impl Default for Params {
             max_target_error_m: 0.03,
             offset_m: 0.08,
             wrong_pose_m: 0.05,
+            between_truths: true,
+            max_median_heading_deg: 180.0,
             body_length_m: 0.61,
             body_width_m: 0.51,
             body_height_m: 1.0,
@@ -143,6 +151,7 @@ impl messages::Parameters for Params {
         within("max_target_error_m", self.max_target_error_m, 0.001, 10.0)?;
         within("offset_m", self.offset_m, 0.0, 2.0)?;
         within("wrong_pose_m", self.wrong_pose_m, 0.001, 10.0)?;
+        within("max_median_heading_deg", self.max_median_heading_deg, 0.01, 180.0)?;
         within("body_length_m", self.body_length_m, 0.05, 2.0)?;
         within("body_width_m", self.body_width_m, 0.05, 2.0)?;
         within("body_height_m", self.body_height_m, 0.05, 3.0)?;

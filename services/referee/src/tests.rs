@@ -297,6 +297,18 @@ fn a_log_is_judged_by_quantiles_at_its_end() {
     log(|_| f64::NAN, Params::default()).expect(RunState::Failed, "median NaN");
 }
 
+#[test]
+fn headings_are_judged_and_poses_between_truths_can_be_left_out() {
+    let run = log(|_| 0.1, Params::default());
+    assert!(run.figure("heading error, median") < 0.0015);
+    // The newest pose before each truth was published 70 ms before it, and the robot drives 1 m/s.
+    let run = log(|_| 0.02, Params { between_truths: false, ..Params::default() });
+    run.expect(RunState::Passed, "median 0.0");
+    assert!((run.figure("error, median") - 0.05).abs() < 0.0015, "{}", run.figure("error, median"));
+    log(|_| 0.0, Params { max_median_heading_deg: 0.01, ..Params::default() })
+        .expect(RunState::Passed, "0.00 deg");
+}
+
 #[track_caller]
 fn refuse(params: Params, text: &str) {
     let error = Referee::new(params).expect_err("must be refused").to_string();
