@@ -96,6 +96,7 @@ fn conduct(args: &ExperimentArgs) -> Result<bool, Box<dyn std::error::Error>> {
         plot::draw(&out.join("plots").join(plot::file_name(&figure)), &figure, &groups)?;
     }
     print!("{}", report::tables(&plan, records, false));
+    println!("{}", computation(records));
     println!("runs.csv, table.md and plots of these runs: {}", out.display());
     if !complete {
         println!("{} of {} runs are done; the same command does the rest", records.len(), plan.runs.len());
@@ -202,6 +203,18 @@ fn print_plan(plan: &Plan, places: usize) {
 fn write_tables(out: &Path, plan: &Plan, records: &[Record]) -> std::io::Result<()> {
     let title = format!("# {}: {} of {} runs\n\n", plan.name, records.len(), plan.runs.len());
     fs::write(out.join("table.md"), title + &report::tables(plan, records, true))
+}
+
+/// How long the runs took, each with all its processes on one processor. Not in the tables: it is not the same the next time.
+fn computation(records: &[Record]) -> String {
+    let took_s: Vec<f64> = records
+        .iter()
+        .filter(|record| record.outcome != Outcome::Error)
+        .map(|record| record.wall_s)
+        .collect();
+    let mean_s = took_s.iter().sum::<f64>() / took_s.len().max(1) as f64;
+    let most_s = took_s.iter().copied().fold(0.0, f64::max);
+    format!("a run took {mean_s:.2} s on average, {most_s:.2} s at most")
 }
 
 /// A bar on a terminal; elsewhere a line for each twentieth.

@@ -50,6 +50,12 @@ pub(super) enum PlanError {
         /// What is there instead.
         value: String,
     },
+    /// A ratio that is called like a figure.
+    #[error("the ratio `{name}` is made of itself: give it a name of its own")]
+    RatioOfItself {
+        /// The name.
+        name: String,
+    },
     /// Two variants cannot be told apart.
     #[error("two variants are called `{name}`: give each a name of its own")]
     SameName {
@@ -93,6 +99,8 @@ struct File {
     swap: Table,
     #[serde(default)]
     without: Vec<String>,
+    #[serde(default)]
+    ratio: BTreeMap<String, [String; 2]>,
     #[serde(default)]
     vary: Table,
     #[serde(default)]
@@ -153,6 +161,8 @@ pub(super) struct Plan {
     /// A name or a path, as `launch up` takes it.
     pub(super) graph: String,
     pub(super) variants: Vec<Variant>,
+    /// Figures of a whole variant: the sum of one figure over all runs by that of another.
+    pub(super) ratios: BTreeMap<String, [String; 2]>,
     /// What the situations differ in, the seed apart.
     pub(super) axes: Vec<String>,
     /// Variant by variant.
@@ -163,7 +173,7 @@ pub(super) struct Plan {
 #[derive(Debug, Clone)]
 pub(super) struct Variant {
     pub(super) name: String,
-    /// Bounds of the mean of a figure, and of `passes`: the share of runs that pass.
+    /// Bounds of the mean of a figure, of a ratio, and of `passes`: the share of runs that pass.
     pub(super) expect: BTreeMap<String, [f64; 2]>,
 }
 
@@ -263,6 +273,9 @@ pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanE
         let worlds = file.worlds.iter().cloned().map(Value::String).collect();
         file.across.insert("graph.defaults.world".to_owned(), Value::Array(worlds));
     }
+    if let Some((name, _)) = file.ratio.iter().find(|(name, parts)| parts.contains(name)) {
+        return Err(PlanError::RatioOfItself { name: name.clone() });
+    }
     let for_all = Changes::of_tables(&file.set, &file.swap, &file.without)?;
     let combinations = product(&file.vary)?;
     if file.variant.is_empty() {
@@ -320,6 +333,7 @@ pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanE
         name: file.name.unwrap_or_else(|| stem.to_owned()),
         graph: located(&file.graph, folder),
         variants,
+        ratios: file.ratio,
         axes: file.across.keys().cloned().collect(),
         runs,
     })

@@ -28,6 +28,17 @@ impl Group<'_> {
     }
 }
 
+impl Group<'_> {
+    /// The sum of one figure by that of another, over the runs that have both; `None` without any.
+    fn ratio(&self, [above, below]: &[String; 2]) -> Option<f64> {
+        let both = |run: &&Record| Some([*run.figures.get(above)?, *run.figures.get(below)?]);
+        let both =
+            self.runs.iter().filter_map(both).filter(|pair| pair.iter().all(|value| value.is_finite()));
+        let [above, below] = both.fold([0.0, 0.0], |sum, pair| [sum[0] + pair[0], sum[1] + pair[1]]);
+        Some(above / below).filter(|ratio| ratio.is_finite())
+    }
+}
+
 /// The records by variant, in the order of the experiment file.
 pub(super) fn groups<'a>(plan: &'a Plan, records: &'a [Record]) -> Vec<Group<'a>> {
     let group = |name: &'a str| {
@@ -57,7 +68,7 @@ pub(super) struct Verdict {
     pub(super) variant: String,
     pub(super) figure: String,
     pub(super) bounds: [f64; 2],
-    /// The mean, or the share of passes; `None` without a run.
+    /// The mean, the ratio, or the share of passes; `None` without a run.
     pub(super) found: Option<f64>,
 }
 
@@ -79,6 +90,8 @@ pub(super) fn verdicts(plan: &Plan, groups: &[Group<'_>]) -> Vec<Verdict> {
                 found: if figure == "passes" {
                     let share = group.count(Outcome::Passed) as f64 / group.runs.len() as f64;
                     Some(share).filter(|share| share.is_finite())
+                } else if let Some(parts) = plan.ratios.get(figure) {
+                    group.ratio(parts)
                 } else {
                     summary(&group.values(figure, false)).map(|summary| summary.mean)
                 },
@@ -102,6 +115,9 @@ pub(super) fn tables(plan: &Plan, records: &[Record], as_markdown: bool) -> Stri
         section("Figures of the runs that passed", means(&groups, &figures, true, as_markdown));
     }
     section("Figures of all runs", means(&groups, &figures, false, as_markdown));
+    if !plan.ratios.is_empty() {
+        section("Ratios of sums over all runs", ratios(plan, &groups, as_markdown));
+    }
     if !verdicts.is_empty() {
         section("Expected", expectations(&verdicts, as_markdown));
     }
@@ -150,6 +166,17 @@ fn means(groups: &[Group<'_>], figures: &[String], only_passed: bool, as_markdow
                 number(sample.deviation),
                 interval,
             ]);
+        }
+    }
+    table
+}
+
+fn ratios(plan: &Plan, groups: &[Group<'_>], as_markdown: bool) -> Table {
+    let mut table = new_table(&["ratio", "of", "variant", "value"], 3, as_markdown);
+    for (name, parts) in &plan.ratios {
+        for group in groups {
+            let value = group.ratio(parts).map_or("-".to_owned(), number);
+            table.add_row([name.clone(), parts.join(" / "), group.name.to_owned(), value]);
         }
     }
     table

@@ -61,6 +61,8 @@ fn wrong_plans_are_refused() {
     check_refused("[[variant]]\nname = 'x'\nseeds = 'all'", "{ from = 1, count = 20 }");
     check_refused("[[variant]]\nname = 'x'\nacross = { 'a.b' = [1] }", "`a.b` is varied across in a variant");
     check_refused("speed = 3", "unknown field `speed`");
+    check_refused("[ratio]\na = ['b', 'a']", "the ratio `a` is made of itself");
+    check_refused("[ratio]\na = ['b']", "expected an array of length 2");
 }
 
 #[test]
@@ -292,4 +294,30 @@ fn tables_and_expectations() {
     let drawn = fs::read_to_string(folder.path().join("time.svg")).unwrap();
     assert_eq!(drawn.matches("<circle").count(), 4, "a dot a run");
     assert!(drawn.contains("good") && drawn.contains("bad"));
+}
+
+#[test]
+fn ratios_are_of_sums_over_the_runs_that_have_both() {
+    let plan = parsed(
+        "[ratio]\nof = ['path', 'shortest']\n[[variant]]\nname = 'a'\nexpect = { of = [1.0, 1.25] }\n\
+         [[variant]]\nname = 'b'\nexpect = { of = [1.0, 1.25] }",
+    )
+    .unwrap();
+    let run = |variant: &str, figures: &[(&str, f64)]| Record {
+        variant: variant.to_owned(),
+        outcome: Outcome::Passed,
+        figures: figures.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
+        ..example("k")
+    };
+    let records = [
+        run("a", &[("path", 9.0), ("shortest", 8.0)]),
+        run("a", &[("path", 3.0), ("shortest", 2.0)]),
+        run("a", &[("path", 100.0)]),
+        run("a", &[("path", 100.0), ("shortest", f64::INFINITY)]),
+        run("b", &[("path", 3.0), ("shortest", 0.0)]),
+    ];
+    let verdicts = report::verdicts(&plan, &report::groups(&plan, &records));
+    assert_eq!(verdicts.iter().map(|verdict| verdict.found).collect::<Vec<_>>(), [Some(1.2), None]);
+    let tables = report::tables(&plan, &records, false);
+    assert!(tables.contains("path / shortest") && tables.contains("1.200"), "{tables}");
 }
