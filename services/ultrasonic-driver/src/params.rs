@@ -75,6 +75,9 @@ pub struct Params {
     /// ... but by no more than this.
     #[schemars(range(min = 0.0, max = 2.0))]
     pub latest_m: f64,
+    /// An edge, where a wall ends, is heard as well as a wall that is met at this angle of incidence. Corners are heard well.
+    #[schemars(range(min = 0.0, max = 90.0))]
+    pub edge_deg: f64,
     /// From this angle of incidence on echoes begin to be lost.
     #[schemars(range(min = 0.0, max = 89.0))]
     pub lost_from_deg: f64,
@@ -107,6 +110,7 @@ impl Default for Params {
             resolution_m: 0.01,
             incidence_growth: 3.0,
             latest_m: 0.30,
+            edge_deg: 45.0,
             lost_from_deg: 25.0,
             lost_to_deg: 60.0,
             lost_share: 0.6,
@@ -184,6 +188,7 @@ impl messages::Parameters for Params {
             ("resolution_m", self.resolution_m, 0.0, 0.1),
             ("incidence_growth", self.incidence_growth, 0.0, 100.0),
             ("latest_m", self.latest_m, 0.0, 2.0),
+            ("edge_deg", self.edge_deg, 0.0, 90.0),
             ("lost_from_deg", self.lost_from_deg, 0.0, 89.0),
             ("lost_to_deg", self.lost_to_deg, 1.0, 90.0),
             ("lost_share", self.lost_share, 0.0, 1.0),

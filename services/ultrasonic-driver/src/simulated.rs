@@ -15,10 +15,10 @@ const SILENT_AFTER: Duration = Duration::from_millis(300);
 const HEIGHT_M: f64 = 0.10;
 /// No ray is followed farther, whatever the sensor can hear.
 const FARTHEST_M: f64 = 20.0;
-/// So near to a wall's end its edge is heard ...
-const EDGE_M: f64 = 0.015;
-/// ... as well as a wall at this angle of incidence.
-const EDGE_RAD: f64 = 0.35;
+/// So near to a wall's end, the end is heard.
+const END_M: f64 = 0.015;
+/// Ends of walls that are so near to each other are one.
+const SAME_M: f64 = 1e-4;
 /// A ray that leaves a wall begins so far from it.
 const OFF_WALL_M: f64 = 1e-6;
 
@@ -83,8 +83,12 @@ impl SimulatedSonar {
     /// wall (NXT-033, NXT-034).
     fn echo(&self, scene: &Scene, hit: Hit, ray: &Ray, noise: [f64; 2], lost: f64, late: f64) -> Option<f64> {
         let params = &self.params;
-        // Edges and corners send sound back wherever it comes from.
-        let most_rad = if is_at_end(scene, hit, ray) { EDGE_RAD } else { FRAC_PI_2 };
+        // A corner sends sound back wherever it comes from, an edge a part of it.
+        let most_rad = match end(scene, hit, ray) {
+            Some(End::Corner) => 0.0,
+            Some(End::Edge { faced_rad }) => faced_rad.min(params.edge_deg.to_radians()),
+            None => FRAC_PI_2,
+        };
         let incidence_rad = hit.incidence_rad().min(most_rad);
         let (from_deg, to_deg) = (params.lost_from_deg, params.lost_to_deg);
         let slant = ((incidence_rad.to_degrees() - from_deg) / (to_deg - from_deg)).clamp(0.0, 1.0);
@@ -117,12 +121,45 @@ impl SimulatedSonar {
     }
 }
 
-/// Whether a ray meets a wall near one of its ends.
-fn is_at_end(scene: &Scene, hit: Hit, ray: &Ray) -> bool {
-    let Surface::Wall(wall) = hit.surface else { return false };
+/// The end of a wall, as a sensor sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum End {
+    /// The sensor looks between two walls into the corner that they make: the sound comes back by way of both.
+    Corner,
+    /// The wall ends there, or another begins behind it: the sound is scattered, or comes back from the one of them that is met the least
+    /// askew.
+    Edge { faced_rad: f64 },
+}
+
+/// The end that a ray meets a wall at, if it does.
+fn end(scene: &Scene, hit: Hit, ray: &Ray) -> Option<End> {
+    let Surface::Wall(wall) = hit.surface else { return None };
+    let walls = scene.walls().segments();
+    let wall = walls.get(wall as usize)?;
     let place = ray.origin + ray.direction * hit.range_m;
-    let ends = scene.walls().segments().get(wall as usize).map(|wall| [wall.a, wall.b]);
-    ends.is_some_and(|ends| ends.iter().any(|end| (place - end).norm() < EDGE_M))
+    let (near, far) =
+        if (place - wall.a).norm() < (place - wall.b).norm() { (wall.a, wall.b) } else { (wall.b, wall.a) };
+    if (place - near).norm() >= END_M {
+        return None;
+    }
+    let back = ray.origin - near;
+    let arms = walls.iter().flat_map(|other| [(other.a, other.b), (other.b, other.a)]);
+    let others = arms.filter(|(begin, end)| (begin - near).norm() < SAME_M && (end - far).norm() >= SAME_M);
+    let others: Vec<Vector2<f64>> = others.map(|(begin, end)| end - begin).collect();
+    // The sensor is between two arms if it lies on the side of each on which the other one is.
+    let is_between = |arm: Vector2<f64>, other: Vector2<f64>| {
+        let same_side = |one: Vector2<f64>, two: Vector2<f64>| one.perp(&back) * one.perp(&two) > 0.0;
+        same_side(arm, other) && same_side(other, arm)
+    };
+    if others.iter().any(|other| is_between(far - near, *other)) {
+        return Some(End::Corner);
+    }
+    let incidence_rad = |arm: &Vector2<f64>| {
+        let length = arm.norm() * back.norm();
+        if length > 0.0 { (arm.perp(&back).abs() / length).min(1.0).acos() } else { 0.0 }
+    };
+    let faced_rad = others.iter().map(incidence_rad).fold(hit.incidence_rad(), f64::min);
+    Some(End::Edge { faced_rad })
 }
 
 /// How far it is from where a ray meets a wall to what it meets next, mirrored at that wall.

@@ -82,6 +82,40 @@ fn errors_grow_with_the_angle_of_incidence() {
 }
 
 #[test]
+fn corners_are_heard_and_edges_less() {
+    // A corner within the cone answers as a wall does that faces the sensor; an edge as one that is met askew.
+    let spread = |world: &str, place: Pose2| {
+        let world = World::parse(world).expect("a world");
+        let params = Params {
+            resolution_m: 0.0,
+            lost_share: 0.0,
+            ray_step_deg: 0.1,
+            half_cone_deg: 0.3,
+            ..Params::default()
+        };
+        let mut sonar = SimulatedSonar::in_world(params, &world, 5);
+        let ranges: Vec<f64> = (0..2000)
+            .filter_map(|_| match sonar.measure(0, place) {
+                Reading::Echo { range_m } => Some(range_m),
+                _ => None,
+            })
+            .collect();
+        let mean = ranges.iter().sum::<f64>() / ranges.len() as f64;
+        (ranges.iter().map(|range| (range - mean).powi(2)).sum::<f64>() / ranges.len() as f64).sqrt()
+    };
+    let square = "name = \"square\"\n[[floor]]\nnumber = 0\noutline = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]\n";
+    let corner_m = spread(square, Pose2::new(1.0, 1.0, 45.0_f64.to_radians()));
+    assert!((0.009..0.0115).contains(&corner_m), "{corner_m}");
+    // An L: from below its arm's end both of its walls are met at 45 degrees.
+    let bent = "name = \"L\"\n[[floor]]\nnumber = 0\noutline = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]]\n";
+    let edge_m = spread(bent, Pose2::new(0.5, 0.5, 45.0_f64.to_radians()));
+    assert!(edge_m > 1.5 * corner_m, "{edge_m} for {corner_m}");
+    // One of the walls of the edge faces this sensor nearly.
+    let faced_m = spread(bent, Pose2::new(0.5, 0.98, 2.0_f64.to_radians()));
+    assert!(faced_m < 1.2 * corner_m, "{faced_m} for {corner_m}");
+}
+
+#[test]
 fn botsim_scatters_in_x_and_y_alike() {
     for askew_deg in [0.0, 40.0] {
         let (mean_m, sigma_m, lost) = errors(NoiseProfile::Botsim, askew_deg);
