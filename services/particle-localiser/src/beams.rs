@@ -45,6 +45,19 @@ impl Beams {
         beams
     }
 
+    /// Every `step`-th of them.
+    pub(crate) fn thinned(&self, step: usize) -> Self {
+        let thin = |all: &Vec<f32>| all.iter().skip(step / 2).step_by(step.max(1)).copied().collect();
+        Self {
+            direction_rad: thin(&self.direction_rad),
+            range_m: thin(&self.range_m),
+            end_x: thin(&self.end_x),
+            end_y: thin(&self.end_y),
+            sensor: self.sensor,
+            dropped: self.dropped,
+        }
+    }
+
     /// How many.
     pub fn len(&self) -> usize {
         self.range_m.len()

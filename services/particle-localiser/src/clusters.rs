@@ -68,6 +68,17 @@ impl Finder {
         self.measure(particles)
     }
 
+    /// For each particle the place of its bin among all bins by weight, after [`Finder::find`].
+    pub(crate) fn bin_ranks(&self) -> Vec<u32> {
+        let mut order: Vec<u32> = (0..self.mass.len() as u32).collect();
+        order.sort_by(|a, b| self.mass[*b as usize].total_cmp(&self.mass[*a as usize]));
+        let mut rank_of = vec![0; order.len()];
+        for (rank, bin) in (0_u32..).zip(&order) {
+            rank_of[*bin as usize] = rank;
+        }
+        self.of_particle.iter().map(|bin| rank_of[*bin as usize]).collect()
+    }
+
     fn join(&mut self, division: Division) {
         let bins = self.table.bins.len();
         self.parent.clear();

@@ -55,11 +55,7 @@ impl Caster {
             Self::Cells(field) => (field.per_metre, 1.0),
         };
         let mut block = Block::gather(x, y, heading, per_metre, border);
-        let (ahead, aside) = (sensor[0] * per_metre, sensor[1] * per_metre);
-        for lane in 0..LANES {
-            block.u[lane] += block.cosine[lane] * ahead - block.sine[lane] * aside;
-            block.v[lane] += block.sine[lane] * ahead + block.cosine[lane] * aside;
-        }
+        block.shift(sensor.map(|offset| offset * per_metre));
         block
     }
 
@@ -107,7 +103,7 @@ impl Caster {
 
 /// A direction of the robot's frame at each particle.
 #[inline(always)]
-fn turned(block: &Block, [cosine, sine]: [f32; 2]) -> (Lanes, Lanes) {
+pub(crate) fn turned(block: &Block, [cosine, sine]: [f32; 2]) -> (Lanes, Lanes) {
     let (mut du, mut dv) = ([0.0; LANES], [0.0; LANES]);
     for lane in 0..LANES {
         du[lane] = block.cosine[lane] * cosine - block.sine[lane] * sine;

@@ -51,6 +51,14 @@ impl Block {
         }
         block
     }
+
+    /// From the robots' middles to a place ahead and to the left of each.
+    pub(crate) fn shift(&mut self, [ahead, aside]: [f32; 2]) {
+        for lane in 0..LANES {
+            self.u[lane] += self.cosine[lane] * ahead - self.sine[lane] * aside;
+            self.v[lane] += self.sine[lane] * ahead + self.cosine[lane] * aside;
+        }
+    }
 }
 
 impl ByteField {

@@ -7,11 +7,12 @@
 
 use crate::bins::Division;
 use crate::clusters::{Cluster, Finder};
+use crate::evidence::{self, Sampled};
 use crate::motion::{MotionSigma, Travel, advance};
 use crate::params::{Params, Start};
 use crate::ratios::Ratios;
 use crate::recovery::Averages;
-use crate::resample::{comb, resample_clusters};
+use crate::resample::{BINS, CLUSTERS, comb, resample_apart};
 use crate::{Beams, Map, Particles, Weigher, kld};
 use geometry::Pose2;
 use serde::{Deserialize, Serialize};
@@ -99,12 +100,17 @@ impl Budget {
 
 /// However small the bound, this many particles are kept.
 const FEWEST: usize = 10;
+/// So many clusters of a search are looked at more closely, if they hold so much of the weight.
+const CANDIDATE_CLUSTERS: usize = 12;
+const LEAST_SHARE: f64 = 1e-4;
 /// Fewest candidates for the particles that are scattered to recover.
 const CANDIDATES: usize = 2000;
 /// Weight of all scattered particles together, for each unit of their share: one scan may fit a mirrored place better by chance, several may not.
 const SCATTERED_PRIOR: f64 = 1e-6;
 /// From one pass to the next the spread shrinks to this.
 const SHRINK: f64 = 0.6;
+/// Scattered particles that are drawn again are moved by this part of the distance between their places.
+const APART: f64 = 0.4;
 /// Directions at one place among scattered particles, which sets how far apart the places are.
 const DIRECTIONS: f64 = 16.0;
 
@@ -252,11 +258,10 @@ impl Filter {
         }
         let mut particles = std::mem::take(&mut self.particles);
         let mut spread = self.spread;
-        let passes = self.params.max_passes;
-        let done = self.anneal(&mut particles, beams, &mut spread, passes, &mut budget);
+        let done = self.anneal(&mut particles, beams, &mut spread, from_nowhere, &mut budget);
         (self.particles, self.spread) = (particles, spread);
         if from_nowhere {
-            self.level_clusters(beams);
+            self.level_clusters(beams, &mut budget);
             self.searches = self.params.recovery.early_scans;
         } else {
             self.searches = self.searches.saturating_sub(1);
@@ -278,33 +283,39 @@ impl Filter {
         })
     }
 
-    /// After a search of the whole map: gives each cluster the weight of its best particle's likelihood. What a cluster has gathered until
-    /// then depends on how near to its peak one of the scattered particles lay, which is chance.
-    fn level_clusters(&mut self, beams: &Beams) {
+    /// After a search of the whole map: draws each cluster anew, and gives it the weight of its evidence.
+    fn level_clusters(&mut self, beams: &Beams, budget: &mut Budget) {
         let clusters = self.finder.find(&self.particles, self.division);
-        let mut best = vec![0_u32; clusters.len()];
-        self.weigher.weigh(&self.particles, beams, &mut self.points);
-        for (rank, points) in self.finder.ranks.iter().zip(&self.points) {
-            if let Some(best) = best.get_mut(*rank as usize) {
-                *best = (*best).max(*points);
+        let candidates =
+            clusters.iter().take(CANDIDATE_CLUSTERS).filter(|cluster| cluster.share > LEAST_SHARE);
+        let count = (self.params.max_particles as usize / 8).clamp(100, 1000);
+        let least = [self.params.jitter_m, self.params.jitter_rad];
+        let mut sampled = Vec::new();
+        for cluster in candidates {
+            if budget.affordable(2 * count, beams.len()) < 2 * count {
+                return;
+            }
+            budget.spend(2 * count, beams.len());
+            self.epoch += 1;
+            let numbers = (self.seed, self.epoch);
+            sampled.extend(evidence::sample(&self.weigher, beams, cluster, count, least, numbers));
+        }
+        let highest = sampled.iter().map(Sampled::highest).fold(f64::NEG_INFINITY, f64::max);
+        if !highest.is_finite() {
+            return;
+        }
+        let particles = &mut self.particles;
+        particles.clear();
+        for Sampled { particles: drawn, log_weights } in &sampled {
+            for (index, log_weight) in log_weights.iter().enumerate() {
+                particles.push(drawn.pose(index));
+                if let Some(weight) = particles.weight.last_mut() {
+                    *weight = (log_weight - highest).exp();
+                }
             }
         }
-        let log = |points: u32| self.weigher.log_likelihood(points, beams.len());
-        let highest = log(best.iter().copied().max().unwrap_or(0));
-        let scale: Vec<f64> = clusters
-            .iter()
-            .zip(&best)
-            .map(|(cluster, points)| (log(*points) - highest).exp() / cluster.share.max(f64::MIN_POSITIVE))
-            .collect();
-        for (weight, rank) in self.particles.weight.iter_mut().zip(&self.finder.ranks) {
-            *weight *= scale.get(*rank as usize).copied().unwrap_or(0.0);
-        }
-        let total: f64 = self.particles.weight.iter().sum();
-        if total > 0.0 {
-            self.particles.weight.iter_mut().for_each(|weight| *weight /= total);
-        } else {
-            self.particles.level();
-        }
+        let total: f64 = particles.weight.iter().sum();
+        particles.weight.iter_mut().for_each(|weight| *weight /= total);
     }
 
     /// Draws the next generation when the particles have become too unequal or too many, with scattered ones among them when the scans
@@ -337,7 +348,7 @@ impl Filter {
         }
         self.draw(count - scattered);
         let (mut others, mut spread) = self.scatter(candidates, false);
-        self.anneal(&mut others, beams, &mut spread, self.params.max_passes, budget);
+        self.anneal(&mut others, beams, &mut spread, true, budget);
         self.epoch += 1;
         let particles = &mut self.particles;
         let kept = particles.len();
@@ -354,7 +365,8 @@ impl Filter {
     /// Draws the next generation from the clusters that were found last.
     fn draw(&mut self, count: usize) {
         self.epoch += 1;
-        resample_clusters(&self.particles, &mut self.spare, &self.finder.ranks, count, self.seed, self.epoch);
+        let (ranks, numbers) = (&self.finder.ranks, (self.seed, self.epoch));
+        resample_apart(&self.particles, &mut self.spare, ranks, CLUSTERS, count, numbers);
         std::mem::swap(&mut self.particles, &mut self.spare);
         self.shake();
     }
@@ -379,7 +391,7 @@ impl Filter {
         let places = (count as f64 / DIRECTIONS).max(1.0);
         let apart_m = (self.map.free_area_m2() / places).sqrt();
         let spread =
-            MotionSigma { place_m: 0.3 * apart_m, heading_rad: 0.3 * std::f64::consts::TAU / DIRECTIONS };
+            MotionSigma { place_m: APART * apart_m, heading_rad: APART * std::f64::consts::TAU / DIRECTIONS };
         (particles, spread)
     }
 
@@ -404,13 +416,19 @@ impl Filter {
         particles: &mut Particles,
         beams: &Beams,
         spread: &mut MotionSigma,
-        passes: u32,
+        is_search: bool,
         budget: &mut Budget,
     ) -> Annealed {
+        let passes = self.params.max_passes;
         let mut done = Annealed { fit: 0.0, passes: 0 };
         let mut points = std::mem::take(&mut self.points);
-        let mut remaining = 1.0;
+        let (mut remaining, mut coarse) = (1.0, 0);
+        // The first passes of a search use little of what a scan tells: a part of the beams tells it as well.
+        let step = beams.len() / (self.params.search_beams as usize).max(1);
+        let few = (is_search && step > 1).then(|| beams.thinned(step));
         loop {
+            let is_coarse = particles.len() > 2 * self.params.max_particles as usize;
+            let beams = few.as_ref().filter(|_| is_coarse).unwrap_or(beams);
             self.weigher.weigh(particles, beams, &mut points);
             budget.spend(particles.len(), beams.len());
             done.passes += 1;
@@ -418,17 +436,19 @@ impl Filter {
                 let mean: f64 = points.iter().zip(&particles.weight).map(|(&p, w)| f64::from(p) * w).sum();
                 done.fit = Weigher::fit(mean, beams.len());
             }
-            let effective = self.params.pass_effective_share * particles.len() as f64;
+            let effective_share = self.params.pass_effective_share;
             let best = points.iter().copied().max().unwrap_or(0);
             let ratios = |exponent: f64| self.weigher.ratios(best, beams.len(), exponent);
             let exponent = if passes == 1 {
                 remaining
             } else {
-                exponent(&particles.weight, &points, ratios, remaining, effective)
+                exponent(&particles.weight, &points, ratios, remaining, effective_share)
             };
             sharpen(&mut particles.weight, &points, &ratios(exponent));
-            remaining -= exponent;
-            if remaining < 1e-6 || done.passes >= passes {
+            // What a part of the beams has told is told again by all of them: it is little.
+            remaining -= if is_coarse { 0.0 } else { exponent };
+            coarse += u32::from(is_coarse);
+            if remaining < 1e-6 || done.passes - coarse >= passes {
                 break;
             }
             let most = (self.params.max_particles as usize).max(particles.len() / 2).min(particles.len());
@@ -438,7 +458,13 @@ impl Filter {
             }
             self.finder.find(particles, self.division);
             self.epoch += 1;
-            resample_clusters(particles, &mut self.spare, &self.finder.ranks, count, self.seed, self.epoch);
+            let numbers = (self.seed, self.epoch);
+            if is_search {
+                let ranks = self.finder.bin_ranks();
+                resample_apart(particles, &mut self.spare, &ranks, BINS, count, numbers);
+            } else {
+                resample_apart(particles, &mut self.spare, &self.finder.ranks, CLUSTERS, count, numbers);
+            }
             std::mem::swap(particles, &mut self.spare);
             self.epoch += 1;
             particles.jitter(self.seed, self.epoch, spread.place_m as f32, spread.heading_rad as f32);
@@ -456,26 +482,26 @@ struct Annealed {
     passes: u32,
 }
 
-/// The largest exponent up to `most` with which at least `effective` particles stay effective.
+/// The largest exponent up to `most` with which at least such a share of the particles stays effective.
 fn exponent(
     weights: &[f64],
     points: &[u32],
     ratios: impl Fn(f64) -> Ratios,
     most: f64,
-    effective: f64,
+    effective_share: f64,
 ) -> f64 {
     // All, or an even selection: an estimate is enough.
     let stride = weights.len().div_ceil(2048).max(1);
-    let share = (weights.len() as f64 / weights.len().div_ceil(stride) as f64).max(1.0);
     let is_enough = |exponent: f64| {
-        let (mut sum, mut squares) = (0.0, 0.0);
+        let (mut sum, mut squares, mut count) = (0.0, 0.0, 0);
         let ratios = ratios(exponent);
         for (weight, points) in weights.iter().zip(points).step_by(stride) {
             let weight = weight * ratios.of(*points);
             sum += weight;
             squares += weight * weight;
+            count += 1;
         }
-        squares > 0.0 && sum * sum / squares * share >= effective
+        squares > 0.0 && sum * sum / squares >= effective_share * f64::from(count)
     };
     if is_enough(most) {
         return most;

@@ -4,6 +4,8 @@
 mod beams;
 mod bins;
 mod clusters;
+mod echo;
+mod evidence;
 mod expected;
 mod field;
 mod filter;
@@ -28,13 +30,13 @@ pub use clusters::Cluster;
 pub use filter::{Filter, Update};
 pub use map::{Map, MapLoadError};
 pub use motion::{MotionSigma, Travel};
-pub use params::{Model, MotionNoise, Params, ParamsError, Recovery, Sensor, Start};
+pub use params::{Echoes, Model, MotionNoise, Params, ParamsError, Recovery, Sensor, Start};
 pub use particles::Particles;
 pub use recovery::Averages;
 pub use snapshot::Snapshot;
 pub use weigh::Weigher;
 
-use geometry::Pose2;
+use geometry::{Pose2, angle};
 use messages::{
     CLUSTER_CAPACITY, LocationStateName, Odometry, Parameters, Particle, ParticleCloud, PoseCluster,
     PoseEstimate, RangeScan, Stamped, Time,
@@ -90,6 +92,9 @@ impl ParticleLocaliser {
     /// When the parameters make no sense.
     pub fn new(params: Params, map: Map, seed: u64) -> Result<Self, ParamsError> {
         params.check()?;
+        if params.model == Model::Echo && map.walls.is_empty() && !map.is_empty() {
+            return Err(ParamsError::NoLines);
+        }
         let is_found = params.start.is_some();
         Ok(Self {
             filter: Filter::new(params.clone(), map, seed),
@@ -179,13 +184,24 @@ impl ParticleLocaliser {
     fn judge(&mut self, update: &Update) {
         let Some(best) = update.clusters.first() else { return };
         let Params { found_sigma_m, found_sigma_rad, found_share, .. } = self.params;
-        let certain = best.sigma_m() <= found_sigma_m
-            && best.sigma_rad() <= found_sigma_rad
-            && best.share >= found_share;
+        let share = self.share_of_place(update);
+        let certain =
+            best.sigma_m() <= found_sigma_m && best.sigma_rad() <= found_sigma_rad && share >= found_share;
         self.is_found |= certain;
-        if best.share < DOUBTFUL_SHARE {
+        if share < DOUBTFUL_SHARE {
             self.is_found = false;
         }
+    }
+
+    /// The part of the weight that lies at the likeliest place: clusters so near to each other that they share a bin are one place.
+    fn share_of_place(&self, update: &Update) -> f64 {
+        let Some(best) = update.clusters.first() else { return 0.0 };
+        let Params { bin_m, bin_rad, .. } = self.params;
+        let is_there = |cluster: &&Cluster| {
+            let turn_rad = angle::difference(cluster.pose.heading_rad, best.pose.heading_rad);
+            cluster.pose.distance_m(best.pose) <= bin_m && turn_rad.abs() <= bin_rad
+        };
+        update.clusters.iter().filter(is_there).map(|cluster| cluster.share).sum()
     }
 
     fn estimate(&self) -> PoseEstimate {
@@ -206,8 +222,8 @@ impl ParticleLocaliser {
             covariance[4] += sigma.place_m * sigma.place_m;
             covariance[8] += sigma.heading_rad * sigma.heading_rad;
         }
-        let doubtful =
-            update.fit < DOUBTFUL_FIT * self.filter.usual_fit() || best.share < self.params.found_share;
+        let doubtful = update.fit < DOUBTFUL_FIT * self.filter.usual_fit()
+            || self.share_of_place(update) < self.params.found_share;
         let state = match (self.is_found, doubtful) {
             (true, false) => LocationStateName::Tracking,
             (true, true) => LocationStateName::Degraded,

@@ -10,7 +10,7 @@ fn main() -> ExitCode {
             Sensor::Laser => "laser/scan",
             Sensor::Sonar => "sonar/scan",
         };
-        let mut odometry = node.latest::<Odometry>("wheels/odometry")?;
+        let mut odometry = node.queue::<Odometry>("wheels/odometry")?;
         let mut scans = node.queue::<RangeScan>(topic)?;
         let mut pose = node.publisher::<PoseEstimate>("location/pose")?;
         let mut particles = node.publisher::<ParticleCloud>("location/particles")?;
@@ -24,15 +24,27 @@ fn main() -> ExitCode {
             localiser.restore(&snapshot);
         }
         Ok(move |now| {
-            let mut inputs = Inputs { odometry: odometry.read(), scan: scans.next() };
+            // In the order of their publication: which odometry belongs to a scan must not depend on when this process is woken.
+            let (mut way, mut scan) = (odometry.next(), scans.next());
             loop {
+                let is_scan = match (&way, &scan) {
+                    (Some(way), Some(scan)) => scan.stamp < way.stamp,
+                    (way, _) => way.is_none(),
+                };
+                let inputs = match is_scan {
+                    true => Inputs { odometry: None, scan },
+                    false => Inputs { odometry: way, scan: None },
+                };
                 let outputs = localiser.step(now, inputs);
                 if let Some((header, elements)) = outputs.cloud {
                     particles.publish_with(&header, elements);
                 }
                 let estimate = outputs.pose;
-                inputs = Inputs { odometry: None, scan: scans.next() };
-                if inputs.scan.is_none() {
+                (way, scan) = match is_scan {
+                    true => (way, scans.next()),
+                    false => (odometry.next(), scan),
+                };
+                if way.is_none() && scan.is_none() {
                     pose.publish(&estimate);
                     break;
                 }

@@ -28,6 +28,54 @@ pub enum Model {
     Beam,
     /// Each reading against the expected one by a Gaussian (NXT-057), each reading clipped.
     Gaussian,
+    /// Each reading of a cone against the nearest wall within, by a density that knows how echoes err (NXT-032 to NXT-034). For maps whose
+    /// walls are lines: world files.
+    Echo,
+}
+
+/// How the echoes of an ultrasonic sensor err, by the angle at which the sound meets a wall.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Echoes {
+    /// An echo is noticed late by about this and the squared tangent of the angle of incidence ...
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub late_m: f64,
+    /// ... but by no more than this.
+    #[schemars(range(min = 0.0, max = 5.0))]
+    pub latest_m: f64,
+    /// From this angle of incidence on echoes begin to be lost ...
+    #[schemars(range(min = 0.0, max = 1.57))]
+    pub lost_from_rad: f64,
+    /// ... and from this one on as many are as ever.
+    #[schemars(range(min = 0.0, max = 1.58))]
+    pub lost_to_rad: f64,
+    /// The share that is lost there, so that something else answers.
+    #[schemars(range(min = 0.0, max = 0.95))]
+    pub lost_share: f64,
+    /// The share that is lost wherever a wall is met, at least.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub lost_least: f64,
+    /// How much farther away what answers instead is, on average.
+    #[schemars(range(min = 0.01, max = 100.0))]
+    pub detour_m: f64,
+    /// An edge is heard as well as a wall that is met at this angle. Corners are heard well.
+    #[schemars(range(min = 0.0, max = 1.57))]
+    pub edge_rad: f64,
+}
+
+impl Default for Echoes {
+    fn default() -> Self {
+        Self {
+            late_m: 0.03,
+            latest_m: 0.2,
+            lost_from_rad: 0.4,
+            lost_to_rad: 1.1,
+            lost_share: 0.6,
+            lost_least: 0.05,
+            detour_m: 0.5,
+            edge_rad: 0.8,
+        }
+    }
 }
 
 /// Errors of the odometry: standard deviations of what one update's travel adds.
@@ -169,6 +217,8 @@ pub struct Params {
     /// A reading counts for no more than that many standard deviations. Gaussian model.
     #[schemars(range(min = 0.5, max = 20.0))]
     pub clip_sigmas: f64,
+    /// How echoes err. Echo model.
+    pub echoes: Echoes,
     /// So many independent readings a scan is worth at most: neighbouring beams err alike.
     #[schemars(range(min = 0.5, max = 4096.0))]
     pub independent_beams: f64,
@@ -178,6 +228,10 @@ pub struct Params {
     /// Most particles while the pose is followed.
     #[schemars(range(min = 10, max = 1000000))]
     pub max_particles: u32,
+    /// Beams that the first passes of a search of the whole map look at, evenly over all: there are many particles then, and little of what
+    /// a scan tells is used.
+    #[schemars(range(min = 1, max = 4096))]
+    pub search_beams: u32,
     /// Particles of a start without a pose.
     #[schemars(range(min = 10, max = 4000000))]
     pub global_particles: u32,
@@ -264,9 +318,11 @@ impl Default for Params {
             random_share: 0.1,
             short_share: 0.1,
             clip_sigmas: 4.0,
+            echoes: Echoes::default(),
             independent_beams: 40.0,
             min_particles: 500,
             max_particles: 5000,
+            search_beams: 4096,
             global_particles: 20_000,
             budget_particle_beams: 0,
             max_passes: 4,
@@ -329,6 +385,21 @@ pub enum ParamsError {
         /// Share of a new scan in the fast average.
         fast_rate: f64,
     },
+    /// Echoes that would be lost at once, or the other way around.
+    #[error(
+        "echoes.lost_from_rad = {lost_from_rad} is not below echoes.lost_to_rad = {lost_to_rad}; lower the first"
+    )]
+    LossBackwards {
+        /// Where echoes begin to be lost.
+        lost_from_rad: f64,
+        /// Where no more are lost.
+        lost_to_rad: f64,
+    },
+    /// The echo model knows walls as lines only.
+    #[error(
+        "model = \"echo\" needs walls that are lines; give it a world file, or choose \"gaussian\" for a grid map"
+    )]
+    NoLines,
     /// Shares that leave nothing for readings of the map.
     #[error(
         "random_share = {random_share} and short_share = {short_share} leave nothing for readings of the map; lower one of them"
@@ -362,6 +433,7 @@ impl Parameters for Params {
         });
         let motion = self.motion;
         let recovery = self.recovery;
+        let echoes = self.echoes;
         let ranges = [
             ("world_resolution_m", self.world_resolution_m, 0.002, 1.0),
             ("occupied_percent", f64::from(self.occupied_percent), 1.0, 100.0),
@@ -373,9 +445,18 @@ impl Parameters for Params {
             ("random_share", self.random_share, 0.001, 0.9),
             ("short_share", self.short_share, 0.0, 0.9),
             ("clip_sigmas", self.clip_sigmas, 0.5, 20.0),
+            ("echoes.late_m", echoes.late_m, 0.0, 1.0),
+            ("echoes.latest_m", echoes.latest_m, 0.0, 5.0),
+            ("echoes.lost_from_rad", echoes.lost_from_rad, 0.0, 1.57),
+            ("echoes.lost_to_rad", echoes.lost_to_rad, 0.0, 1.58),
+            ("echoes.lost_share", echoes.lost_share, 0.0, 0.95),
+            ("echoes.lost_least", echoes.lost_least, 0.0, 0.5),
+            ("echoes.detour_m", echoes.detour_m, 0.01, 100.0),
+            ("echoes.edge_rad", echoes.edge_rad, 0.0, 1.57),
             ("independent_beams", self.independent_beams, 0.5, 4096.0),
             ("min_particles", f64::from(self.min_particles), 10.0, 1e6),
             ("max_particles", f64::from(self.max_particles), 10.0, 1e6),
+            ("search_beams", f64::from(self.search_beams), 1.0, 4096.0),
             ("global_particles", f64::from(self.global_particles), 10.0, 4e6),
             ("max_passes", f64::from(self.max_passes), 1.0, 50.0),
             ("pass_effective_share", self.pass_effective_share, 0.01, 0.9),
@@ -424,6 +505,10 @@ impl Parameters for Params {
         let Recovery { slow_rate, fast_rate, .. } = recovery;
         if slow_rate >= fast_rate {
             return Err(ParamsError::SlowNotSlower { slow_rate, fast_rate });
+        }
+        let Echoes { lost_from_rad, lost_to_rad, .. } = echoes;
+        if lost_from_rad >= lost_to_rad {
+            return Err(ParamsError::LossBackwards { lost_from_rad, lost_to_rad });
         }
         if random_share + short_share > 0.95 {
             return Err(ParamsError::NothingLeft { random_share, short_share });

@@ -15,6 +15,7 @@ pub(crate) enum Purpose {
     Comb = 3,
     Jitter = 4,
     Scatter = 5,
+    Evidence = 6,
 }
 
 const LANES: u64 = 8;

@@ -29,53 +29,68 @@ pub(crate) fn resample(from: &Particles, into: &mut Particles, count: usize, see
     into.level();
 }
 
-/// Clusters that are drawn from separately.
-const KEPT_APART: usize = 12;
-/// A cluster with less of the weight may die out.
-const WORTH_KEEPING: f64 = 0.005;
-/// Each cluster worth keeping gets at least this part of the particles.
-const FLOOR: f64 = 0.03;
+/// Groups that are drawn from separately, so that none dies by chance: places that are alike must stay alike until the robot has moved
+/// (after Vermaak et al. 2003, "Maintaining multi-modality through mixture tracking").
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Apart {
+    /// No more than this, the heaviest.
+    pub(crate) most: usize,
+    /// A group with a smaller part of the weight may die out.
+    pub(crate) least_share: f64,
+}
 
-/// Draws about `count` particles, from each cluster separately, so that none dies by chance: places that are alike must stay alike until
-/// the robot has moved (after Vermaak et al. 2003, "Maintaining multi-modality through mixture tracking"). A small cluster gets more
-/// particles than its share, which weigh less. `ranks` says for each particle in which cluster it lies, 0 for the heaviest.
-pub(crate) fn resample_clusters(
+/// The clusters of a belief.
+pub(crate) const CLUSTERS: Apart = Apart { most: 12, least_share: 0.005 };
+/// The bins of a search: of a place that will fit, too little may be known yet to call it a cluster.
+pub(crate) const BINS: Apart = Apart { most: 64, least_share: 0.0 };
+
+/// So large a part of the particles is shared out evenly among the groups, so that each is judged by enough of them.
+const EVEN: f64 = 0.5;
+
+/// Draws about `count` particles, from each group separately. A light group gets more particles than its share, which weigh less.
+/// `ranks` says for each particle in which group it lies, 0 for the heaviest.
+pub(crate) fn resample_apart(
     from: &Particles,
     into: &mut Particles,
     ranks: &[u32],
+    groups: Apart,
     count: usize,
-    seed: u64,
-    epoch: u64,
+    numbers: (u64, u64),
 ) {
     // The last group is everything that is not kept apart.
-    let mut mass = [0.0; KEPT_APART + 1];
-    let group = |rank: u32| (rank as usize).min(KEPT_APART);
+    let mut mass = vec![0.0; groups.most + 1];
+    let group = |rank: u32| (rank as usize).min(groups.most);
     for (rank, weight) in ranks.iter().zip(&from.weight) {
         mass[group(*rank)] += weight;
     }
     let total: f64 = mass.iter().sum();
-    let apart = mass[..KEPT_APART].iter().filter(|mass| **mass > WORTH_KEEPING * total).count();
+    let is_worth = |mass: &&f64| **mass > groups.least_share * total;
+    let apart = mass[..groups.most].iter().take_while(is_worth).count();
+    let (seed, epoch) = numbers;
     if apart < 2 {
         resample(from, into, count, seed, epoch);
         return;
     }
     let rest: f64 = mass[apart..].iter().sum();
+    let mut members: Vec<Vec<u32>> = vec![Vec::new(); apart + 1];
+    for (index, rank) in (0_u32..).zip(ranks) {
+        members[(*rank as usize).min(apart)].push(index);
+    }
     into.clear();
     let mut weights = Vec::with_capacity(from.len());
-    let parts = mass[..apart].iter().map(|mass| (*mass, FLOOR)).chain([(rest, 0.0)]);
+    let even = EVEN / apart as f64;
+    let parts = mass[..apart].iter().map(|mass| (*mass, even)).chain([(rest, 0.0)]);
     for (part, (mass, least)) in parts.enumerate() {
         let share = mass / total;
         let teeth = (share.max(least) * count as f64).round() as usize;
         if teeth == 0 {
             continue;
         }
+        let members = &members[part];
         weights.clear();
-        let of_part = |rank: &u32| (*rank as usize).min(apart) == part;
-        weights.extend(
-            ranks.iter().zip(&from.weight).map(|(rank, weight)| if of_part(rank) { *weight } else { 0.0 }),
-        );
-        comb(&weights, teeth, seed, epoch.wrapping_add((part as u64) << 48), |index| {
-            into.push(from.pose(index));
+        weights.extend(members.iter().map(|index| from.weight[*index as usize]));
+        comb(&weights, teeth, seed, epoch.wrapping_add((part as u64) << 48), |member| {
+            into.push(from.pose(members[member] as usize));
             if let Some(weight) = into.weight.last_mut() {
                 *weight = share / teeth as f64;
             }

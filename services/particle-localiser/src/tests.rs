@@ -1,3 +1,4 @@
 //! Cases, one line each.
 
+mod echoes;
 mod pieces;

@@ -3,6 +3,7 @@
 //! Every model gives each beam 0 (the map does not explain it) to [`FULL`] points. Points are whole numbers, so their sum does not depend
 //! on the order, the vector unit or the number of threads.
 
+use crate::echo::EchoModel;
 use crate::expected::{Caster, Lanes};
 use crate::field::{ByteField, LANES};
 use crate::params::{Model, Params};
@@ -42,6 +43,8 @@ enum Kind {
     Beam { caster: Caster, table: Vec<u8>, per_metre: f32 },
     /// Squared differences, clipped.
     Gaussian { caster: Caster, per_metre: f32, clip: f32 },
+    /// Logarithms of densities that depend on how a wall is met.
+    Echo(EchoModel),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -88,6 +91,10 @@ impl Weigher {
                 let per_metre = (RANGES as f64 / params.range_max_m) as f32;
                 (Kind::Beam { caster: caster(), table, per_metre }, nats)
             }
+            Model::Echo => {
+                let (echoes, nats) = EchoModel::new(params, &map.walls);
+                (Kind::Echo(echoes), nats)
+            }
             Model::Gaussian => {
                 let clip = params.clip_sigmas as f32;
                 (
@@ -112,6 +119,7 @@ impl Weigher {
             Kind::LogField(field) | Kind::CubeField(field) => field.bytes(),
             Kind::Beam { caster, table, .. } => of_caster(caster) + table.len(),
             Kind::Gaussian { caster, .. } => of_caster(caster),
+            Kind::Echo(echoes) => echoes.table_bytes(),
         }
     }
 
@@ -146,6 +154,9 @@ impl Weigher {
 
     /// What each particle's sensor is expected to read along each beam, particle by particle; nothing for the models that expect no ranges.
     pub fn expected_ranges(&self, particles: &Particles, beams: &Beams) -> Vec<f32> {
+        if let Kind::Echo(echoes) = &self.kind {
+            return echoes.expected_ranges(particles, beams);
+        }
         let (Kind::Beam { caster, .. } | Kind::Gaussian { caster, .. }) = &self.kind else {
             return Vec::new();
         };
@@ -205,6 +216,12 @@ impl Weigher {
                         total[lane] += u32::from(row[column & (RANGES - 1)]);
                     }
                 });
+            }
+            Kind::Echo(echoes) => {
+                let blocks = poses[0].chunks(LANES).zip(poses[1].chunks(LANES)).zip(poses[2].chunks(LANES));
+                for (((x, y), heading), points) in blocks.zip(points.chunks_mut(LANES)) {
+                    points.copy_from_slice(&echoes.points([x, y, heading], beams)[..points.len()]);
+                }
             }
             Kind::Gaussian { caster, per_metre, clip } => {
                 let most = clip * clip;
@@ -279,6 +296,7 @@ impl Scan {
                 scan.rows = beams.range_m.iter().map(row).collect();
             }
             Kind::Gaussian { .. } => scan.aim(beams, weigher.cone),
+            Kind::Echo(_) => {}
         }
         scan
     }

@@ -7,6 +7,8 @@
     reason = "each test uses a part of it"
 )]
 
+pub mod arenas;
+
 use flate2::read::GzDecoder;
 use geometry::{Grid, GridFrame, Occupancy, OccupancyGrid, Point2, Pose2, angle};
 use messages::{Odometry, PoseEstimate, RangeScan, Stamped, Time};
@@ -318,4 +320,40 @@ pub fn kidnap(drive: &Drive, params: Params, seed: u64, most_m: f64) -> Run {
     let to = (0..1000).map(|_| place()).find(|to| looks[*to].truth.distance_m(left) > 3.0).unwrap();
     robot.carry();
     Run::of(&mut robot, &looks[to..], most_m)
+}
+
+/// How a drive was followed, the worst of several seeds.
+#[derive(Debug, Clone, Copy)]
+pub struct Followed {
+    pub median_m: f64,
+    pub median_deg: f64,
+    /// The largest single error.
+    pub farthest_m: f64,
+}
+
+/// Follows a drive with 500 particles, with several seeds.
+pub fn follow(drive: &Drive, seeds: u64, most_m: f64) -> Followed {
+    let mut worst = Followed { median_m: 0.0, median_deg: 0.0, farthest_m: 0.0 };
+    for seed in 0..seeds {
+        let run = track(drive, seed, most_m);
+        let (median_m, median_deg) = run.quantile(0.5);
+        worst.median_m = worst.median_m.max(median_m);
+        worst.median_deg = worst.median_deg.max(median_deg);
+        worst.farthest_m = worst.farthest_m.max(run.quantile(1.0).0);
+    }
+    worst
+}
+
+/// Of so many starts without a pose, spread over the drive, how many were right at the end of 10 m of travel, and knew.
+pub fn found(drive: &Drive, starts: usize) -> usize {
+    let is_right = |start: &usize| {
+        let looks = &drive.looks[start * (drive.looks.len() * 9 / 10) / starts..];
+        Run::of(&mut Robot::new(drive, Params::default(), *start as u64), looks, 10.0).is_right()
+    };
+    (0..starts).filter(is_right).count()
+}
+
+/// Of so many robots that were carried elsewhere, how many knew where they were within so much travel.
+pub fn recovered(drive: &Drive, runs: u64, most_m: f64) -> usize {
+    (0..runs).filter(|seed| kidnap(drive, Params::default(), *seed, most_m).is_right()).count()
 }
