@@ -1,6 +1,6 @@
 //! What the robot may touch: the walls of the map, or what a scan has shown of them.
 
-use geometry::{Point2, Polygon, Pose2, Scene, Segment, Vector2, Walls, World};
+use geometry::{Point2, Polygon, Pose2, Segment, Vector2, Walls, World};
 use messages::RangeScan;
 
 /// Turns are looked at in steps of this.
@@ -15,7 +15,7 @@ const MEDIAN_HALF: usize = 2;
 /// Walls, and the body that must not touch them.
 #[derive(Debug, Clone)]
 pub(crate) struct Arena {
-    scene: Scene,
+    walls: Walls,
     outline: Option<Polygon>,
     footprint: Polygon,
 }
@@ -26,7 +26,7 @@ impl Arena {
         let floor = world.floors.first();
         let walls = floor.map(|floor| world.wall_segments(floor.number)).unwrap_or_default();
         let outline = floor.and_then(geometry::world::Floor::outline_polygon);
-        Self { scene: Scene::new(walls), outline, footprint }
+        Self { walls: Walls::new(walls), outline, footprint }
     }
 
     /// What a raw scan shows, in the frame of the robot that took it. `None` for a scan that shows nothing.
@@ -48,7 +48,7 @@ impl Arena {
         };
         let corners: Vec<_> = (0..count).map(corner).collect();
         let walls = (0..count).map(|index| Segment::new(corners[index], corners[(index + 1) % count]));
-        Some(Self { scene: Scene::new(walls), outline: None, footprint })
+        Some(Self { walls: Walls::new(walls), outline: None, footprint })
     }
 
     /// The closed line around the free space, where the world has one.
@@ -58,12 +58,26 @@ impl Arena {
 
     /// The walls.
     pub(crate) fn walls(&self) -> &Walls {
-        self.scene.walls()
+        &self.walls
     }
 
     /// Room around the body at a pose; infinite without walls.
     pub(crate) fn room_m(&self, pose: Pose2) -> f64 {
-        self.scene.clearance_m(&self.footprint, pose, [0.0, 1.0], None)
+        self.room_up_to_m(pose, f64::INFINITY)
+    }
+
+    /// The same, but no more than `enough_m`: walls that are farther away need not be looked at closely.
+    pub(crate) fn room_up_to_m(&self, pose: Pose2, enough_m: f64) -> f64 {
+        let (centre, reach_m) = (pose.position(), self.footprint.radius_m());
+        let mut placed: Option<Polygon> = None;
+        let mut least_m = enough_m;
+        for wall in self.walls.segments() {
+            if wall.distance_m(centre) - reach_m < least_m {
+                let body = placed.get_or_insert_with(|| self.footprint.transformed(pose));
+                least_m = least_m.min(body.distance_to_segment_m(wall));
+            }
+        }
+        least_m
     }
 
     /// The least room around the body while it turns.
@@ -134,7 +148,7 @@ impl Arena {
 
     /// How far the robot can drive back, up to `most_m`, with `margin_m` left.
     pub(crate) fn retreat_m(&self, pose: Pose2, most_m: f64, margin_m: f64) -> f64 {
-        let steps = (most_m / WAY_STEP_M).ceil().max(1.0) as u32;
+        let steps = (most_m / WAY_STEP_M).ceil().clamp(1.0, 500.0) as u32;
         let mut free_m = 0.0;
         for step in 1..=steps {
             let way_m = most_m * f64::from(step) / f64::from(steps);
@@ -144,150 +158,5 @@ impl Arena {
             free_m = way_m;
         }
         free_m
-    }
-}
-
-/// What has to be done before the robot can drive straight to a place.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Manoeuvre {
-    /// First so far ahead, or back, to where there is room for the turn.
-    pub(crate) first_m: f64,
-    /// Then so far around.
-    pub(crate) turn_rad: f64,
-    /// The least room on the way.
-    pub(crate) room_m: f64,
-}
-
-/// How far the robot may go to find room for a turn.
-const FIRST_M: [f64; 13] =
-    [0.0, 0.02, -0.02, 0.04, -0.04, 0.06, -0.06, 0.08, -0.08, 0.10, -0.10, 0.13, -0.13];
-/// A metre of detour is worth this much turning.
-const RAD_PER_M: f64 = 30.0;
-/// Smaller turns are none.
-const NO_TURN_RAD: f64 = 0.004;
-
-/// What the robot knows of its surroundings, and where it is in them.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct View<'a> {
-    pub(crate) arena: &'a Arena,
-    pub(crate) pose: Pose2,
-}
-
-/// The least room that any view shows around the body while it turns.
-pub(crate) fn turning_room_m(views: &[View<'_>], ahead_m: f64, turn_rad: f64) -> f64 {
-    let room_m = |view: &View<'_>| {
-        view.arena.turning_room_m(view.pose.compose(Pose2::new(ahead_m, 0.0, 0.0)), turn_rad)
-    };
-    views.iter().map(room_m).fold(f64::INFINITY, f64::min)
-}
-
-/// The same while it drives straight.
-pub(crate) fn driving_room_m(views: &[View<'_>], way_m: f64) -> f64 {
-    views.iter().map(|view| view.arena.driving_room_m(view.pose, way_m)).fold(f64::INFINITY, f64::min)
-}
-
-/// How far a body that cannot turn anywhere may turn, and then drive, to get away from a wall beside it.
-const ESCAPE_RAD: [f64; 6] = [0.15, -0.15, 0.30, -0.30, 0.45, -0.45];
-const ESCAPE_M: [f64; 6] = [0.05, -0.05, 0.10, -0.10, 0.15, -0.15];
-/// Less room is none.
-const NO_ROOM_M: f64 = 0.003;
-
-/// A small turn and a short way that lead the body out of a narrow place, to where there is more room.
-pub(crate) fn escape(views: &[View<'_>]) -> Option<(f64, f64)> {
-    let ways = ESCAPE_RAD.into_iter().flat_map(|turn_rad| ESCAPE_M.map(|way_m| (turn_rad, way_m)));
-    let room_m = |(turn_rad, way_m): (f64, f64)| {
-        let turned: Vec<View<'_>> = views
-            .iter()
-            .map(|view| View { pose: view.pose.compose(Pose2::new(0.0, 0.0, turn_rad)), ..*view })
-            .collect();
-        let on_the_way_m = turning_room_m(views, 0.0, turn_rad).min(driving_room_m(&turned, way_m));
-        let there_m =
-            turned.iter().map(|view| view.arena.room_m(view.pose.compose(Pose2::new(way_m, 0.0, 0.0))));
-        (on_the_way_m >= NO_ROOM_M).then(|| there_m.fold(f64::INFINITY, f64::min))
-    };
-    let free = ways.filter_map(|way| Some((way, room_m(way)?)));
-    free.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(way, _)| way)
-}
-
-/// The cheapest way to look at a place, given as seen from the robot, with room for the body in all views; the roomiest where there is not
-/// enough. Either way around is tried.
-pub(crate) fn manoeuvre(views: &[View<'_>], margin_m: f64, place: Point2<f64>) -> Manoeuvre {
-    let options = FIRST_M.into_iter().flat_map(|first_m| {
-        let short_rad = place.y.atan2(place.x - first_m);
-        let long_rad = short_rad - std::f64::consts::TAU.copysign(short_rad);
-        [(first_m, short_rad), (first_m, long_rad)]
-    });
-    let mut best: Option<(f64, Manoeuvre)> = None;
-    for (first_m, turn_rad) in options {
-        let cost = first_m.abs() * RAD_PER_M + turn_rad.abs();
-        let enough = |(_, found): &(f64, Manoeuvre)| found.room_m >= margin_m;
-        if best.as_ref().is_some_and(|best| enough(best) && best.0 <= cost) {
-            continue;
-        }
-        let turn_rad = if turn_rad.abs() < NO_TURN_RAD { 0.0 } else { turn_rad };
-        let way_room_m = if first_m == 0.0 { f64::INFINITY } else { driving_room_m(views, first_m) };
-        let turn_room_m =
-            if turn_rad == 0.0 { f64::INFINITY } else { turning_room_m(views, first_m, turn_rad) };
-        let found = (cost, Manoeuvre { first_m, turn_rad, room_m: way_room_m.min(turn_room_m) });
-        let better = match &best {
-            None => true,
-            Some(best) if enough(best) => enough(&found),
-            Some(best) => found.1.room_m > best.1.room_m,
-        };
-        if better {
-            best = Some(found);
-        }
-    }
-    best.map_or(Manoeuvre { first_m: 0.0, turn_rad: 0.0, room_m: 0.0 }, |(_, found)| found)
-}
-
-/// Where an approach may begin: so far from its end, in so many directions.
-const APPROACH_M: [f64; 4] = [0.06, 0.10, 0.14, 0.20];
-const APPROACHES: u32 = 24;
-/// An approach begins where the robot can turn as it likes.
-const APPROACH_ROOM_M: f64 = 0.125;
-/// A turn more has to be worth its error.
-const VIA_COST_M: f64 = 0.05;
-
-impl Arena {
-    /// The least room on the straight way to a place, the turn to it included.
-    fn way_room_m(&self, pose: Pose2, place: Point2<f64>, margin_m: f64) -> (f64, Pose2) {
-        let views = [View { arena: self, pose }];
-        let turn = manoeuvre(&views, margin_m, pose.inverse_transform(place));
-        let from = pose.compose(Pose2::new(turn.first_m, 0.0, turn.turn_rad));
-        let way_m = (place - from.position()).norm();
-        let there = from.compose(Pose2::new(way_m, 0.0, 0.0));
-        (turn.room_m.min(self.driving_room_m(from, way_m)), there)
-    }
-
-    /// By way of which place the body best gets to a last one: `None` for the straight way. A box that drives up to a wall askew touches it
-    /// with a corner where one that drives along it, or straight at it, does not.
-    pub(crate) fn approach(&self, pose: Pose2, place: Point2<f64>, margin_m: f64) -> Option<Point2<f64>> {
-        let (direct_room_m, _) = self.way_room_m(pose, place, margin_m);
-        if direct_room_m >= margin_m {
-            return None;
-        }
-        let mut best = (direct_room_m.min(margin_m), (place - pose.position()).norm(), None);
-        for (reach_m, step) in
-            APPROACH_M.into_iter().flat_map(|reach_m| (0..APPROACHES).map(move |step| (reach_m, step)))
-        {
-            let heading_rad = f64::from(step) / f64::from(APPROACHES) * std::f64::consts::TAU;
-            let begin = Pose2::new(place.x, place.y, heading_rad).compose(Pose2::new(-reach_m, 0.0, 0.0));
-            if self.free_m(begin.position()) < APPROACH_ROOM_M {
-                continue;
-            }
-            let last_room_m = self.driving_room_m(begin, reach_m);
-            if last_room_m <= best.0 && best.0 < margin_m {
-                continue;
-            }
-            let (first_room_m, there) = self.way_room_m(pose, begin.position(), margin_m);
-            let (second_room_m, _) = self.way_room_m(there, place, margin_m);
-            let room_m = last_room_m.min(first_room_m).min(second_room_m).min(margin_m);
-            let cost_m = (begin.position() - pose.position()).norm() + reach_m + VIA_COST_M;
-            if room_m > best.0 || (room_m == best.0 && cost_m < best.1) {
-                best = (room_m, cost_m, Some(begin.position()));
-            }
-        }
-        best.2
     }
 }

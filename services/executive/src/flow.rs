@@ -1,7 +1,7 @@
 //! What comes next: the flow of Fig. 8 (NXT-095), one task after the other.
 
-use crate::arena::{Manoeuvre, View, driving_room_m, escape, manoeuvre, turning_room_m};
-use crate::{Executive, Inputs, resolve};
+use crate::route::{Leg, Route, View, route};
+use crate::{Belief, Executive, Inputs, resolve};
 use geometry::{Point2, Pose2, angle};
 use messages::{
     FixedText, JourneyStageName, MotionCommand, MotionKindName, MotionStateName, PlanRequest, PlanStateName,
@@ -36,8 +36,6 @@ pub(crate) enum Motion {
     Move(f64),
     /// Turns to a place of the map and drives there, as far as the certainty of the pose allows.
     Towards(Point2<f64>),
-    /// The same to the end of the path, by way of another place where the body needs that.
-    Approach(Point2<f64>),
 }
 
 /// What follows motions.
@@ -49,6 +47,17 @@ pub(crate) enum Then {
     Survey,
     /// The end of the path: a new look around, and it counts as an arrival.
     Arrive,
+}
+
+/// How a way to a place begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum NextLeg {
+    /// With a leg that is not the last.
+    First(Leg),
+    /// It is the way to the place itself.
+    Straight,
+    /// It does not: there is no room.
+    Nowhere,
 }
 
 /// What is counted.
@@ -69,15 +78,10 @@ const NO_TURN_RAD: f64 = 0.03;
 const REACHED_M: f64 = 0.004;
 /// Ways to tell places apart are looked for along the belief's best place; they may be so wrong.
 const STEP_M: f64 = 0.02;
-/// Where a turn has less room the robot first gets away from the walls, so often at most.
-const NARROW_M: f64 = 0.005;
-const MOST_ESCAPES: u32 = 3;
-/// A way shorter than this leads nowhere.
-const NO_WAY_M: f64 = 0.03;
-/// A scan is worth looking at while the robot is no farther from where it was taken.
-const SEEN_REACH_M: f64 = 0.05;
-/// Farther away a scan shows walls nearer than they are, as its cones are wide.
-const SEEN_WAY_M: f64 = 0.15;
+/// So often in a row the robot looks again instead of driving a way that is not certain.
+const MOST_LOOKS: u32 = 2;
+/// A place that takes more motions to be looked at is given up, for another look around.
+const MOST_DETOURS: u32 = 12;
 
 impl Executive {
     /// Goes on to the next task if the present one is done. Returns whether it was.
@@ -177,11 +181,10 @@ impl Executive {
         turns[usize::from(faces_first)..].sort_by(|a, b| a.abs().total_cmp(&b.abs()));
         self.seen_at = self.belief.map_or(Pose2::IDENTITY, |belief| belief.pose);
         // A scan alone shows edges of walls farther away than they are: weak echoes are late.
-        let margin_m = match self.place() {
-            Some(belief) => self.params.turn_margin_m + belief.sigma_m,
-            None => self.params.turn_margin_m + self.params.scan_margin_m,
-        };
-        let has_room = |turn_rad: &f64| turning_room_m(&self.views(), 0.0, *turn_rad) >= margin_m;
+        let margin_m = self.wanted_room_m();
+        let views = self.views();
+        let room_m = |view: &View<'_>, turn_rad: f64| view.arena.turning_room_m(view.pose, turn_rad);
+        let has_room = |turn_rad: &f64| views.iter().all(|view| room_m(view, *turn_rad) >= margin_m);
         match turns.into_iter().find(has_room) {
             Some(turn_rad) => {
                 let window_rad = angle::difference(bearing_rad, turn_rad);
@@ -213,8 +216,9 @@ impl Executive {
             return self.keep(now, Task::Locating { scans, since });
         }
         self.only_localising = false;
-        self.escapes = 0;
+        self.detours = 0;
         self.seen_at = self.belief.map_or(Pose2::IDENTITY, |belief| belief.pose);
+        self.placed_at = self.seen_at;
         if self.place().is_none() {
             self.count.ambiguous += 1;
             return self.resolve(now);
@@ -236,7 +240,7 @@ impl Executive {
     fn resolve(&mut self, now: Time) -> bool {
         self.at_end = false;
         let way = resolve::way(&self.arena, &self.places, &mut self.rng);
-        let from = self.places.first().map(|place| place.pose);
+        let from = self.places.hypotheses.first().map(|place| place.pose);
         let mut rest: VecDeque<Motion> = VecDeque::new();
         if let (Some(from), false) = (from, way.is_empty()) {
             rest.extend(way.into_iter().map(|seen| Motion::Towards(from.transform(seen))));
@@ -298,7 +302,7 @@ impl Executive {
         let mut rest: VecDeque<Motion> = places.filter(is_finite).skip(1).map(Motion::Towards).collect();
         // Whatever the planner rounds, the aim itself is meant.
         rest.pop_back();
-        rest.push_back(Motion::Approach(self.aim(path.elements)));
+        rest.push_back(Motion::Towards(self.aim(path.elements)));
         self.task = Task::Moving { stage: JourneyStageName::Driving, rest, then: Then::Arrive };
         self.begin(now)
     }
@@ -352,57 +356,42 @@ impl Executive {
             match motion {
                 Motion::Turn(turn_rad) => self.order(MotionKindName::Turn, turn_rad),
                 Motion::Move(way_m) => self.order(MotionKindName::Move, way_m),
-                Motion::Approach(place) => {
-                    let Some(belief) = self.belief else { return self.survey(now) };
-                    rest.push_front(Motion::Towards(place));
-                    let via = self.arena.approach(belief.pose, place, self.params.approach_margin_m);
-                    if let Some(via) = via {
-                        rest.push_front(Motion::Towards(via));
-                    }
-                    continue;
-                }
                 Motion::Towards(place) => {
                     let Some(belief) = self.belief else { return self.survey(now) };
                     let left_m = (place - belief.pose.position()).norm();
                     if left_m <= REACHED_M {
                         continue;
                     }
-                    let Manoeuvre { first_m, turn_rad, room_m } = self.turn_to(belief.pose, place);
-                    if room_m < NARROW_M
-                        && self.escapes < MOST_ESCAPES
-                        && let Some((turn_rad, way_m)) = escape(&self.views())
-                    {
-                        self.escapes += 1;
-                        rest.push_front(motion);
-                        rest.push_front(Motion::Move(way_m));
-                        self.order(MotionKindName::Turn, turn_rad);
-                    } else if first_m != 0.0 || turn_rad != 0.0 {
-                        rest.push_front(motion);
-                        if first_m != 0.0 {
-                            self.escapes += 1;
-                            self.order(MotionKindName::Move, first_m);
-                        } else {
+                    let (way_m, is_last) = match self.next_leg(belief.pose, place) {
+                        NextLeg::First(Leg::Turn(turn_rad)) => {
+                            rest.push_front(motion);
+                            self.detours += 1;
                             self.order(MotionKindName::Turn, turn_rad);
+                            self.task = Task::Moving { stage, rest, then };
+                            return false;
                         }
-                    } else {
-                        let mut certain_m =
-                            self.certain_way_m(belief.pose, place, belief.sigma_m, belief.sigma_rad);
-                        if stage == JourneyStageName::Resolving {
-                            certain_m = certain_m.min(self.seen_way_m(left_m));
-                        }
-                        if certain_m < left_m - REACHED_M {
-                            rest.clear();
-                            then = Then::Survey;
-                        }
-                        if certain_m < NO_WAY_M
-                            && let Some((turn_rad, way_m)) = self.open_space()
-                        {
-                            rest.push_front(Motion::Move(way_m));
-                            self.order(MotionKindName::Turn, turn_rad);
-                        } else {
-                            self.order(MotionKindName::Move, left_m.min(certain_m));
-                        }
+                        NextLeg::First(Leg::Move(way_m)) => (way_m, false),
+                        NextLeg::Straight => (left_m, true),
+                        NextLeg::Nowhere => return self.survey(now),
+                    };
+                    let mut certain_m = f64::INFINITY;
+                    if way_m > 0.0 {
+                        certain_m = self.certain_way_m(&belief, way_m);
                     }
+                    if certain_m < way_m - REACHED_M {
+                        if certain_m < self.params.shortest_way_m && self.looks < MOST_LOOKS {
+                            // Standing still is safe, and another look tells more.
+                            self.looks += 1;
+                            return self.survey(now);
+                        }
+                        rest.clear();
+                        then = Then::Survey;
+                    } else if !is_last {
+                        rest.push_front(motion);
+                        self.detours += 1;
+                    }
+                    self.looks = 0;
+                    self.order(MotionKindName::Move, way_m.min(certain_m.max(self.params.shortest_way_m)));
                 }
             }
             self.task = Task::Moving { stage, rest, then };
@@ -418,57 +407,68 @@ impl Executive {
         }
     }
 
-    /// What the robot knows of its surroundings: the map where the place is certain, and the last scan while it is near where it was taken.
+    /// What the robot knows of its surroundings: the map where its place is certain, or is one of a few; else the last scan.
     fn views(&self) -> Vec<View<'_>> {
-        let map = self.place().map(|belief| View { arena: &self.arena, pose: belief.pose });
-        let now = self.belief.map_or(Pose2::IDENTITY, |belief| belief.pose);
-        let moved = self.seen_at.to(now);
-        let is_near = moved.x_m.hypot(moved.y_m) <= SEEN_REACH_M;
-        let scan = self.seen.as_ref().filter(|_| is_near || map.is_none());
-        map.into_iter().chain(scan.map(|(_, arena)| View { arena, pose: moved })).collect()
+        if let Some(belief) = self.place() {
+            return vec![View { arena: &self.arena, pose: belief.pose }];
+        }
+        let moved = |from: Pose2| from.to(self.belief.map_or(from, |belief| belief.pose));
+        if self.places.sigma_m.is_some() {
+            let moved = moved(self.placed_at);
+            let view =
+                |place: &resolve::Hypothesis| View { arena: &self.arena, pose: place.pose.compose(moved) };
+            return self.places.hypotheses.iter().map(view).collect();
+        }
+        self.seen.iter().map(|(_, arena)| View { arena, pose: moved(self.seen_at) }).collect()
     }
 
-    /// What it takes to look at a place.
-    fn turn_to(&self, pose: Pose2, place: Point2<f64>) -> Manoeuvre {
+    /// Room that is wanted around the body: more where less is known.
+    fn wanted_room_m(&self) -> f64 {
+        let error_m = match (self.place(), self.places.sigma_m) {
+            (Some(belief), _) => belief.sigma_m,
+            (None, Some(sigma_m)) => sigma_m,
+            (None, None) => self.params.scan_margin_m,
+        };
+        self.params.turn_margin_m + error_m
+    }
+
+    /// What the body has to do before it can drive straight to a place, or because it cannot get there.
+    fn next_leg(&self, pose: Pose2, place: Point2<f64>) -> NextLeg {
         let seen = pose.inverse_transform(place);
-        if seen.y.atan2(seen.x).abs() < self.params.heading_tolerance_rad {
-            return Manoeuvre { first_m: 0.0, turn_rad: 0.0, room_m: f64::INFINITY };
+        let tolerance_rad = self.params.heading_tolerance_rad;
+        let is_turn = |leg: &Leg| matches!(leg, Leg::Turn(turn_rad) if turn_rad.abs() >= tolerance_rad);
+        if self.detours >= MOST_DETOURS {
+            return NextLeg::Nowhere;
         }
-        if self.escapes >= MOST_ESCAPES {
-            // It has looked for room long enough.
-            return Manoeuvre { first_m: 0.0, turn_rad: seen.y.atan2(seen.x), room_m: f64::INFINITY };
+        match route(&self.views(), self.wanted_room_m(), seen) {
+            Route::There(legs) => match legs[..] {
+                [Leg::Move(_)] | [] => NextLeg::Straight,
+                [turn @ Leg::Turn(_), Leg::Move(_)] if !is_turn(&turn) => NextLeg::Straight,
+                [leg, ..] => NextLeg::First(leg),
+            },
+            Route::Away(legs) => legs.first().map_or(NextLeg::Nowhere, |leg| NextLeg::First(*leg)),
         }
-        let error_m = self.place().map_or(self.params.scan_margin_m, |belief| belief.sigma_m);
-        manoeuvre(&self.views(), self.params.turn_margin_m + error_m, seen)
     }
 
-    /// How far the robot may drive by what it has seen; beyond a short way it relies on the guard.
-    fn seen_way_m(&self, way_m: f64) -> f64 {
-        let views = self.views();
-        let most_m = way_m.min(SEEN_WAY_M);
-        let steps = (most_m / STEP_M).ceil().max(1.0) as u32;
+    /// How far the body may drive before the error of its pose could bring it too near to a wall. What is so near already does not count
+    /// until the body comes nearer.
+    fn certain_way_m(&self, belief: &Belief, way_m: f64) -> f64 {
+        let front_m = 0.5 * self.params.body_length_m;
+        let spare_m = |at_m: f64| {
+            let pose = belief.pose.compose(Pose2::new(at_m, 0.0, 0.0));
+            let error_m = belief.sigma_m + belief.sigma_rad * (at_m + front_m);
+            self.arena.room_m(pose) - self.params.way_margin_m - self.params.way_sigmas * error_m
+        };
+        // However far a message says that it is.
+        let steps = (way_m / STEP_M).ceil().clamp(1.0, 500.0) as u32;
+        let mut last_m = spare_m(0.0).min(0.0);
         for step in 1..=steps {
-            let to_m = most_m * f64::from(step) / f64::from(steps);
-            if driving_room_m(&views, to_m) < self.params.way_margin_m {
-                return (to_m - STEP_M).max(0.0);
+            let at_m = way_m * f64::from(step) / f64::from(steps);
+            let here_m = spare_m(at_m);
+            if here_m < last_m {
+                return way_m * f64::from(step - 1) / f64::from(steps);
             }
-        }
-        f64::INFINITY
-    }
-
-    /// How far the robot may drive before the error of its pose could bring it too near to a wall.
-    fn certain_way_m(&self, pose: Pose2, place: Point2<f64>, sigma_m: f64, sigma_rad: f64) -> f64 {
-        let way = place - pose.position();
-        let length_m = way.norm();
-        let half_m = 0.5 * self.params.body_width_m + self.params.way_margin_m;
-        let steps = (length_m / STEP_M).ceil().max(1.0) as u32;
-        for step in 1..=steps {
-            let way_m = length_m * f64::from(step) / f64::from(steps);
-            let beside_m = self.arena.free_m(pose.position() + way * (way_m / length_m));
-            let error_m = self.params.way_sigmas * (sigma_m + sigma_rad * way_m);
-            if beside_m < half_m + error_m && way_m > self.params.shortest_way_m {
-                return (way_m - STEP_M).max(self.params.shortest_way_m);
-            }
+            last_m = here_m.min(0.0);
         }
         f64::INFINITY
     }

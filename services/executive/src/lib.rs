@@ -5,6 +5,7 @@ mod arena;
 mod flow;
 mod params;
 mod resolve;
+mod route;
 
 #[cfg(test)]
 mod tests;
@@ -66,16 +67,21 @@ pub struct Executive {
     belief: Option<Belief>,
     /// What the newest scan has shown, in the frame of the robot then.
     seen: Option<(Time, Arena)>,
-    /// The belief's pose when that scan was weighed.
+    /// The belief's pose when that scan was taken, or weighed.
     seen_at: Pose2,
-    places: Vec<resolve::Hypothesis>,
+    /// The belief's pose when `places` were found.
+    placed_at: Pose2,
+    /// Where it may be.
+    places: resolve::Places,
     cloud_stamp: Option<Time>,
     /// Since when the robot waits for another service.
     waits_since: Option<Time>,
     /// Whether the robot has come to the end of a path.
     at_end: bool,
-    /// Narrow places that it has left since its last scan.
-    escapes: u32,
+    /// Motions since the last scan that only made room for others.
+    detours: u32,
+    /// Looks in a row for the sake of certainty.
+    looks: u32,
     only_localising: bool,
     count: Count,
     remark: FixedText<64>,
@@ -88,7 +94,7 @@ pub struct Executive {
 
 /// What the localiser says.
 #[derive(Debug, Clone, Copy)]
-struct Belief {
+pub(crate) struct Belief {
     pose: Pose2,
     /// Standard deviations.
     sigma_m: f64,
@@ -134,11 +140,13 @@ impl Executive {
             belief: None,
             seen: None,
             seen_at: Pose2::IDENTITY,
-            places: Vec::new(),
+            placed_at: Pose2::IDENTITY,
+            places: resolve::Places::default(),
             cloud_stamp: None,
             waits_since: None,
             at_end: false,
-            escapes: 0,
+            detours: 0,
+            looks: 0,
             only_localising: false,
             count: Count::default(),
             remark: FixedText::EMPTY,
@@ -191,7 +199,7 @@ impl Executive {
         {
             self.cloud_stamp = Some(cloud.stamp);
             let elements: &[Particle] = cloud.elements;
-            self.places = resolve::hypotheses(cloud.message, elements);
+            self.places = resolve::Places::of_cloud(cloud.message, elements);
             let alike = cloud.places().iter().filter(|place| place.share > ALIKE_SHARE).count();
             self.count.places = u32::try_from(alike).unwrap_or(u32::MAX);
         }

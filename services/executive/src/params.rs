@@ -45,16 +45,13 @@ pub struct Params {
     /// So much more where the place is not known, and only a scan shows the walls.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub scan_margin_m: f64,
-    /// Room that is wanted around the body as it comes to the target.
-    #[schemars(range(min = 0.0, max = 0.5))]
-    pub approach_margin_m: f64,
-    /// Room beside the body that a way must keep, however wrong the pose may be.
+    /// Room around the body that a way must keep, however wrong the pose may be.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub way_margin_m: f64,
     /// So many standard deviations the pose may be wrong: a way that would then be too near to a wall is broken off for another scan.
     #[schemars(range(min = 0.0, max = 6.0))]
     pub way_sigmas: f64,
-    /// No way is broken off before this.
+    /// No way is broken off before this, once another look has not helped.
     #[schemars(range(min = 0.01, max = 2.0))]
     pub shortest_way_m: f64,
     /// A robot that looks so nearly at a place drives there without a turn.
@@ -99,10 +96,9 @@ impl Default for Params {
             body_width_m: 0.14,
             turn_margin_m: 0.012,
             scan_margin_m: 0.015,
-            approach_margin_m: 0.015,
             way_margin_m: 0.005,
             way_sigmas: 2.0,
-            shortest_way_m: 0.15,
+            shortest_way_m: 0.10,
             heading_tolerance_rad: 0.01,
             turn_to_wall: true,
             face_wall_from_m: 0.13,
@@ -175,7 +171,6 @@ impl messages::Parameters for Params {
             ("body_width_m", self.body_width_m, 0.02, 2.0),
             ("turn_margin_m", self.turn_margin_m, 0.0, 0.5),
             ("scan_margin_m", self.scan_margin_m, 0.0, 0.5),
-            ("approach_margin_m", self.approach_margin_m, 0.0, 0.5),
             ("way_margin_m", self.way_margin_m, 0.0, 0.5),
             ("way_sigmas", self.way_sigmas, 0.0, 6.0),
             ("shortest_way_m", self.shortest_way_m, 0.01, 2.0),

@@ -27,6 +27,8 @@ const REACH_M: f64 = 1.3;
 const ROOM_M: f64 = 0.13;
 /// Ways keep this distance at the likeliest pose, and at the others.
 const BESIDE_M: [f64; 2] = [0.11, 0.105];
+/// The beginning of the first way, which may lie in a narrow place.
+const LEAVE_M: f64 = 0.06;
 /// A way must be free at poses of this weight.
 const FREE_WEIGHT: f64 = 0.9;
 /// Standard deviation of what can be told apart.
@@ -37,18 +39,49 @@ const RANGE_M: f64 = 2.5;
 const COST_PER_M: f64 = 0.2;
 const COST_PER_TURN: f64 = 0.03;
 
-/// The poses that a cloud of particles holds, the likeliest first.
-pub(crate) fn hypotheses(cloud: &ParticleCloud, particles: &[messages::Particle]) -> Vec<Hypothesis> {
-    let mut found: Vec<Hypothesis> = cloud
-        .places()
-        .iter()
-        .filter(|place| place.share >= LEAST_SHARE)
-        .map(|place| Hypothesis {
-            pose: Pose2::new(place.x_m, place.y_m, place.heading_rad),
-            weight: place.share.min(1.0),
-        })
-        .filter(|hypothesis| hypothesis.pose.is_finite())
-        .collect();
+/// Where the robot may be.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Places {
+    /// The places that a cloud of particles holds, the likeliest first.
+    pub(crate) hypotheses: Vec<Hypothesis>,
+    /// Whether these are all: a few places, each of which is certain to so much, as a standard deviation.
+    pub(crate) sigma_m: Option<f64>,
+}
+
+/// Clusters are all that there is when they hold so much of the weight, and none is wider.
+const ALL_SHARE: f64 = 0.98;
+const WIDE_M: f64 = 0.03;
+const WIDE_RAD: f64 = 0.15;
+
+impl Places {
+    /// What a message says.
+    pub(crate) fn of_cloud(cloud: &ParticleCloud, particles: &[messages::Particle]) -> Self {
+        let is_place = |place: &&messages::PoseCluster| {
+            let numbers = [place.x_m, place.y_m, place.heading_rad, place.sigma_m, place.sigma_rad];
+            place.share >= LEAST_SHARE && numbers.iter().all(|number| number.is_finite())
+        };
+        let clusters: Vec<_> = cloud.places().iter().filter(is_place).collect();
+        let mut hypotheses: Vec<Hypothesis> = clusters
+            .iter()
+            .map(|place| Hypothesis {
+                pose: Pose2::new(place.x_m, place.y_m, place.heading_rad),
+                weight: place.share.min(1.0),
+            })
+            .collect();
+        let share: f64 = clusters.iter().map(|place| place.share).sum();
+        let is_narrow = |place: &&messages::PoseCluster| place.sigma_m < WIDE_M && place.sigma_rad < WIDE_RAD;
+        if share >= ALL_SHARE && clusters.iter().all(is_narrow) {
+            let sigma_m = clusters.iter().map(|place| place.sigma_m).fold(0.0, f64::max);
+            return Self { hypotheses, sigma_m: Some(sigma_m) };
+        }
+        hypotheses.extend(selection(cloud, particles));
+        Self { hypotheses, sigma_m: None }
+    }
+}
+
+/// A few of the particles, by weight.
+fn selection(cloud: &ParticleCloud, particles: &[messages::Particle]) -> Vec<Hypothesis> {
+    let mut found = Vec::new();
     let weight = |particle: &messages::Particle| f64::from(particle.weight).clamp(0.0, 1e6);
     let total: f64 = particles.iter().map(weight).filter(|weight| weight.is_finite()).sum();
     if total > 0.0 {
@@ -81,12 +114,14 @@ struct Place {
 }
 
 /// The places to drive to, one after the other, as seen from the robot; empty when no way leads anywhere.
-pub(crate) fn way(arena: &Arena, hypotheses: &[Hypothesis], rng: &mut impl Rng) -> Vec<Point2<f64>> {
+pub(crate) fn way(arena: &Arena, places: &Places, rng: &mut impl Rng) -> Vec<Point2<f64>> {
+    let hypotheses = &places.hypotheses;
+    let free_weight = if places.sigma_m.is_some() { 0.999 } else { FREE_WEIGHT };
     let (Some(first), Some(outline)) = (hypotheses.first(), arena.outline()) else { return Vec::new() };
     let total: f64 = hypotheses.iter().map(|hypothesis| hypothesis.weight).sum();
-    let mut places = vec![Place { seen: Point2::origin(), cost: 0.0, before: 0, is_done: false }];
+    let mut roadmap = vec![Place { seen: Point2::origin(), cost: 0.0, before: 0, is_done: false }];
     let mut tries = 0;
-    while places.len() <= PLACES && tries < 20 * PLACES {
+    while roadmap.len() <= PLACES && tries < 20 * PLACES {
         tries += 1;
         let Some(place) = outline.random_place(ROOM_M, || rng.random()) else { break };
         let seen = first.pose.inverse_transform(place);
@@ -94,47 +129,54 @@ pub(crate) fn way(arena: &Arena, hypotheses: &[Hypothesis], rng: &mut impl Rng) 
             continue;
         }
         let free = hypotheses.iter().filter(|other| arena.free_m(other.pose.transform(seen)) >= BESIDE_M[1]);
-        if free.map(|other| other.weight).sum::<f64>() >= FREE_WEIGHT * total {
-            places.push(Place { seen, cost: f64::INFINITY, before: 0, is_done: false });
+        if free.map(|other| other.weight).sum::<f64>() >= free_weight * total {
+            roadmap.push(Place { seen, cost: f64::INFINITY, before: 0, is_done: false });
         }
     }
     let is_free = |from: Point2<f64>, to: Point2<f64>| {
+        // How the body leaves a narrow place is found when it drives.
+        let away = to - from;
+        let from = if from == Point2::origin() && away.norm() > LEAVE_M {
+            from + away * (LEAVE_M / away.norm())
+        } else {
+            from
+        };
         let beside_m = |pose: Pose2| arena.beside_m(pose.transform(from), pose.transform(to));
         if beside_m(first.pose) < BESIDE_M[0] {
             return false;
         }
         let free = hypotheses.iter().filter(|other| beside_m(other.pose) >= BESIDE_M[1]);
-        free.map(|other| other.weight).sum::<f64>() >= FREE_WEIGHT * total
+        free.map(|other| other.weight).sum::<f64>() >= free_weight * total
     };
     // Dijkstra's algorithm on the complete graph; ways are checked when they would be better.
-    while let Some(here) = (0..places.len())
-        .filter(|&index| !places[index].is_done && places[index].cost.is_finite())
-        .min_by(|&a, &b| places[a].cost.total_cmp(&places[b].cost))
+    while let Some(here) = (0..roadmap.len())
+        .filter(|&index| !roadmap[index].is_done && roadmap[index].cost.is_finite())
+        .min_by(|&a, &b| roadmap[a].cost.total_cmp(&roadmap[b].cost))
     {
-        places[here].is_done = true;
-        for there in 0..places.len() {
-            let step_m = (places[there].seen - places[here].seen).norm();
-            let cost = places[here].cost + COST_PER_M * step_m + COST_PER_TURN;
-            if !places[there].is_done
-                && cost < places[there].cost
-                && is_free(places[here].seen, places[there].seen)
+        roadmap[here].is_done = true;
+        for there in 0..roadmap.len() {
+            let step_m = (roadmap[there].seen - roadmap[here].seen).norm();
+            let cost = roadmap[here].cost + COST_PER_M * step_m + COST_PER_TURN;
+            if !roadmap[there].is_done
+                && cost < roadmap[there].cost
+                && is_free(roadmap[here].seen, roadmap[there].seen)
             {
-                (places[there].cost, places[there].before) = (cost, here);
+                (roadmap[there].cost, roadmap[there].before) = (cost, here);
             }
         }
     }
     let value = |index: &usize| {
-        let place = &places[*index];
+        let place = &roadmap[*index];
         1.0 - (-difference(arena, hypotheses, total, place.seen)).exp() - place.cost
     };
-    let reached = (1..places.len()).filter(|index| places[*index].cost.is_finite());
+    let reached = (1..roadmap.len()).filter(|index| roadmap[*index].cost.is_finite());
     let valued = reached.map(|index| (index, value(&index)));
     let Some((best, _)) = valued.max_by(|a, b| a.1.total_cmp(&b.1)) else { return Vec::new() };
     let mut way = Vec::new();
     let mut at = best;
     while at != 0 {
-        way.push(places[at].seen);
-        at = places[at].before;
+        way.push(roadmap[at].seen);
+        at = roadmap[at].before;
     }
     way.reverse();
     way
