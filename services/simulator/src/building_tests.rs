@@ -171,21 +171,3 @@ fn the_robot_begins_beside_the_tea_room_and_the_crossing_person_waits_for_it() {
         && crossing.path.last().unwrap()[1] > 0.85;
     assert!(crosses && crossing.path[0][0] < world.door("207").unwrap().at[0]);
 }
-
-/// How long a step takes near furniture and people, printed for the curious: `cargo test --release -p simulator -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-#[expect(clippy::disallowed_methods, reason = "it measures")]
-fn duration_of_a_step() {
-    let params = Params { world: path().to_string_lossy().into_owned(), ..Params::default() };
-    let mut simulator = Simulator::new(params, 1).unwrap();
-    let applied = messages::AppliedWheels { left_mps: 0.3, right_mps: 0.309, ..Default::default() };
-    let begin = std::time::Instant::now();
-    let steps = 4000;
-    for step in 0..steps {
-        let now = Time::from_nanos(step * 10_000_000);
-        simulator.step(now, Inputs { applied: Some(messages::Stamped::new(now, &applied)), call: None });
-    }
-    let pose = simulator.pose;
-    println!("{:.2} us a step, at {pose:?}", begin.elapsed().as_secs_f64() * 1e6 / steps as f64);
-}

@@ -131,20 +131,3 @@ path = [[5.0, 0.0]]
     let open = frame(&mut device, &messages::WorldTruth { open_doors: [1, 0], ..truth(10.0, -0.35, 0.0) });
     assert_eq!((closed.reading(0), open.reading(0)), (Reading::Distance(0.345), Reading::NoTarget));
 }
-
-/// How long a frame takes, printed for the curious: `cargo test --release -p tof-driver -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-#[expect(clippy::disallowed_methods, reason = "it measures")]
-fn duration_of_a_frame() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../launch/worlds/cs-building.toml");
-    let mut device = crate::SimulatedTof::new(Params { world: path.into(), ..Params::default() }, 1).unwrap();
-    for x_m in [3.0, 7.0, 8.0, 12.8, 16.6, 21.0, 26.0] {
-        let place = truth(x_m, -0.2, 0.1);
-        let begin = std::time::Instant::now();
-        for _ in 0..1000 {
-            frame(&mut device, &place);
-        }
-        println!("{:.1} us a frame at x = {x_m}", begin.elapsed().as_secs_f64() * 1e3);
-    }
-}

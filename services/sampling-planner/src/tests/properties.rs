@@ -89,12 +89,12 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(120))]
 
     #[test]
-    fn finds_what_enumeration_finds(samples in points(0..8), ends in points(2..3), seed: u64, percent in 5_u64..60, literal: bool) {
+    fn finds_what_enumeration_finds(samples in points(0..9), ends in points(2..3), seed: u64, percent in 5_u64..60, literal: bool) {
         check_as_enumerated([ends[0], ends[1]], &samples, literal, &lottery(seed, percent));
     }
 
     #[test]
-    fn finds_what_enumeration_finds_in_an_arena(samples in points(4..8), ends in points(2..3), offset_m in 0.0..0.12, literal: bool) {
+    fn finds_what_enumeration_finds_in_an_arena(samples in points(4..9), ends in points(2..3), offset_m in 0.0..0.12, literal: bool) {
         let space = space("default", offset_m);
         let view = View::new(&space, &[], 0.0);
         check_as_enumerated([ends[0], ends[1]], &samples, literal, &|from, to| view.is_open(from, to));
