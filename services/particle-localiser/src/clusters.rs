@@ -60,7 +60,9 @@ impl Finder {
         self.mass.clear();
         for index in 0..particles.len() {
             let bin = self.table.add(division.bin(particles.pose(index)));
-            self.mass.resize(self.table.bins.len(), 0.0);
+            if bin == self.mass.len() {
+                self.mass.push(0.0);
+            }
             self.mass[bin] += particles.weight[index];
             self.of_particle.push(bin as u32);
         }

@@ -35,6 +35,16 @@ impl Particles {
         self.weight.push(0.0);
     }
 
+    /// Adds copies of another set's particles, without weight.
+    pub(crate) fn append(&mut self, from: &Self, picks: &[u32]) {
+        let copy =
+            |into: &mut Vec<f32>, from: &[f32]| into.extend(picks.iter().map(|pick| from[*pick as usize]));
+        copy(&mut self.x, &from.x);
+        copy(&mut self.y, &from.y);
+        copy(&mut self.heading, &from.heading);
+        self.weight.resize(self.x.len(), 0.0);
+    }
+
     /// One particle's place and heading.
     pub fn pose(&self, index: usize) -> [f32; 3] {
         [self.x[index], self.y[index], self.heading[index]]

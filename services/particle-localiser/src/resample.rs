@@ -24,8 +24,10 @@ pub(crate) fn comb(weights: &[f64], count: usize, seed: u64, epoch: u64, mut pic
 
 /// Draws `count` particles into `into`, all of equal weight.
 pub(crate) fn resample(from: &Particles, into: &mut Particles, count: usize, seed: u64, epoch: u64) {
+    let mut picks = Vec::with_capacity(count);
+    comb(&from.weight, count, seed, epoch, |index| picks.push(index as u32));
     into.clear();
-    comb(&from.weight, count, seed, epoch, |index| into.push(from.pose(index)));
+    into.append(from, &picks);
     into.level();
 }
 
@@ -44,7 +46,7 @@ pub(crate) const CLUSTERS: Apart = Apart { most: 12, least_share: 0.005 };
 /// The bins of a search: of a place that will fit, too little may be known yet to call it a cluster.
 pub(crate) const BINS: Apart = Apart { most: 64, least_share: 0.0 };
 
-/// So large a part of the particles is shared out evenly among the groups, so that each is judged by enough of them.
+/// No group gets less than its even part of so large a part of the particles, so that each is judged by enough of them.
 const EVEN: f64 = 0.5;
 
 /// Draws about `count` particles, from each group separately. A light group gets more particles than its share, which weigh less.
@@ -72,29 +74,41 @@ pub(crate) fn resample_apart(
         return;
     }
     let rest: f64 = mass[apart..].iter().sum();
-    let mut members: Vec<Vec<u32>> = vec![Vec::new(); apart + 1];
+    // The particles of each group one after the other, by counting.
+    let part_of = |rank: &u32| (*rank as usize).min(apart);
+    let mut begins = vec![0; apart + 2];
+    ranks.iter().for_each(|rank| begins[part_of(rank) + 1] += 1);
+    (1..begins.len()).for_each(|part| begins[part] += begins[part - 1]);
+    let mut next = begins.clone();
+    let mut sorted = vec![0_u32; ranks.len()];
     for (index, rank) in (0_u32..).zip(ranks) {
-        members[(*rank as usize).min(apart)].push(index);
+        let place = &mut next[part_of(rank)];
+        sorted[*place] = index;
+        *place += 1;
     }
     into.clear();
     let mut weights = Vec::with_capacity(from.len());
+    let mut picks = Vec::with_capacity(count);
+    // In all as many as were asked for.
     let even = EVEN / apart as f64;
+    let wanted: f64 = mass[..apart].iter().map(|mass| (mass / total).max(even)).sum::<f64>() + rest / total;
     let parts = mass[..apart].iter().map(|mass| (*mass, even)).chain([(rest, 0.0)]);
     for (part, (mass, least)) in parts.enumerate() {
         let share = mass / total;
-        let teeth = (share.max(least) * count as f64).round() as usize;
+        let teeth = (share.max(least) / wanted * count as f64).round() as usize;
         if teeth == 0 {
             continue;
         }
-        let members = &members[part];
+        let members = &sorted[begins[part]..begins[part + 1]];
         weights.clear();
         weights.extend(members.iter().map(|index| from.weight[*index as usize]));
+        picks.clear();
         comb(&weights, teeth, seed, epoch.wrapping_add((part as u64) << 48), |member| {
-            into.push(from.pose(members[member] as usize));
-            if let Some(weight) = into.weight.last_mut() {
-                *weight = share / teeth as f64;
-            }
+            picks.push(members[member]);
         });
+        into.append(from, &picks);
+        let drawn = into.len() - picks.len();
+        into.weight[drawn..].fill(share / teeth as f64);
     }
     let drawn: f64 = into.weight.iter().sum();
     into.weight.iter_mut().for_each(|weight| *weight /= drawn);
