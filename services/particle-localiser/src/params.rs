@@ -225,7 +225,7 @@ pub struct Params {
     /// Fewest particles.
     #[schemars(range(min = 10, max = 1000000))]
     pub min_particles: u32,
-    /// Most particles while the pose is followed.
+    /// Most particles while the pose is followed; half as many more while several places are kept apart.
     #[schemars(range(min = 10, max = 1000000))]
     pub max_particles: u32,
     /// Beams that the first passes of a search of the whole map look at, evenly over all: there are many particles then, and little of what

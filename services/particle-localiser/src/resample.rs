@@ -49,8 +49,8 @@ pub(crate) const BINS: Apart = Apart { most: 64, least_share: 0.0 };
 /// No group gets less than its even part of so large a part of the particles, so that each is judged by enough of them.
 const EVEN: f64 = 0.5;
 
-/// Draws about `count` particles, from each group separately. A light group gets more particles than its share, which weigh less.
-/// `ranks` says for each particle in which group it lies, 0 for the heaviest.
+/// Draws `count` particles, and up to half as many more where light groups are kept apart: the heavy ones need theirs. A light group gets
+/// more particles than its share, which weigh less. `ranks` says for each particle in which group it lies, 0 for the heaviest.
 pub(crate) fn resample_apart(
     from: &Particles,
     into: &mut Particles,
@@ -89,13 +89,11 @@ pub(crate) fn resample_apart(
     into.clear();
     let mut weights = Vec::with_capacity(from.len());
     let mut picks = Vec::with_capacity(count);
-    // In all as many as were asked for.
     let even = EVEN / apart as f64;
-    let wanted: f64 = mass[..apart].iter().map(|mass| (mass / total).max(even)).sum::<f64>() + rest / total;
     let parts = mass[..apart].iter().map(|mass| (*mass, even)).chain([(rest, 0.0)]);
     for (part, (mass, least)) in parts.enumerate() {
         let share = mass / total;
-        let teeth = (share.max(least) / wanted * count as f64).round() as usize;
+        let teeth = (share.max(least) * count as f64).round() as usize;
         if teeth == 0 {
             continue;
         }

@@ -165,7 +165,7 @@ fn check_apart(groups: Apart, weights: [f64; 3], least: [usize; 3]) {
     }
     let mut into = Particles::default();
     resample_apart(&from, &mut into, &ranks, groups, 300, (1, 2));
-    assert!(into.len().abs_diff(300) <= 3, "{} of 300", into.len());
+    assert!((297..=453).contains(&into.len()), "{} of 300", into.len());
     let total: f64 = weights.iter().sum();
     for (rank, (weight, least)) in weights.into_iter().zip(least).enumerate() {
         let members = (0..into.len()).filter(|index| into.x[*index] == rank as f32);
@@ -179,11 +179,11 @@ fn check_apart(groups: Apart, weights: [f64; 3], least: [usize; 3]) {
 
 #[test]
 fn light_groups_are_kept_by_enough_particles_without_more_weight() {
-    check_apart(CLUSTERS, [0.9, 0.08, 0.02], [200, 35, 35]);
+    check_apart(CLUSTERS, [0.9, 0.08, 0.02], [200, 45, 45]);
     // Too light to be kept apart.
-    check_apart(CLUSTERS, [0.9, 0.099, 0.001], [200, 60, 0]);
+    check_apart(CLUSTERS, [0.9, 0.099, 0.001], [200, 70, 0]);
     // In a search everything is.
-    check_apart(BINS, [0.9, 0.0999, 0.0001], [200, 35, 35]);
+    check_apart(BINS, [0.9, 0.0999, 0.0001], [200, 45, 45]);
     check_apart(CLUSTERS, [1.0, 0.0, 0.0], [300, 0, 0]);
 }
 
