@@ -40,9 +40,6 @@ pub(crate) struct EchoModel {
     range_max_m: f32,
     /// Points by kind and column.
     table: Vec<u8>,
-    /// Density of a reading from nowhere, which gets no points.
-    #[cfg(test)]
-    anything: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -115,8 +112,6 @@ impl EchoModel {
             edge_facing: params.echoes.edge_rad.cos() as f32,
             range_max_m: params.range_max_m as f32,
             table,
-            #[cfg(test)]
-            anything: params.random_share / params.range_max_m,
         };
         (model, nats)
     }
@@ -365,16 +360,15 @@ impl EchoModel {
         self.table[self.index(1.0 + difference_m, 1.0, facing)]
     }
 
-    /// The probability of all differences that the table knows, but for what has nothing to do with the map.
-    pub(crate) fn mass(&self, facing: f32, nats: f64) -> f64 {
+    /// The probability of all differences that the table knows, where a reading without points has the density `worst`.
+    pub(crate) fn mass(&self, facing: f32, nats: f64, worst: f64) -> f64 {
         let density = |column: usize| {
             let difference_m = SHORTEST_M + (column as f64 + 0.5) * COLUMN_M;
             let points = f64::from(self.points_of(facing, difference_m as f32));
             (points / FULL * nats).exp()
         };
-        // The worst that the table holds is a reading from nowhere.
         let sum: f64 = (0..COLUMNS).map(density).sum();
-        sum * COLUMN_M * self.anything
+        sum * COLUMN_M * worst
     }
 }
 

@@ -99,8 +99,10 @@ fn densities_are_densities() {
     // Over all differences, for every kind of meeting, the density sums to what lies within the table.
     let (model, nats) = EchoModel::new(&params(), &[Segment::between([0.0, 0.0], [1.0, 0.0])]);
     assert!((5.0..12.0).contains(&nats), "{nats}");
+    // The worst that the table holds is a reading from nowhere.
+    let worst = params().random_share / params().range_max_m;
     for facing in [1.0, 0.9, 0.7, 0.5, 0.2] {
-        let mass = model.mass(facing, nats);
+        let mass = model.mass(facing, nats, worst);
         // Rounding to 255 steps, and what comes back later than the table knows.
         assert!((0.75..1.1).contains(&mass), "{mass} at {facing}");
     }
