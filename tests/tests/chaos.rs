@@ -26,7 +26,8 @@ fn twenty_five_deeds_leave_a_whole_and_safe_robot() {
     assert_eq!(report["contacts"], 0);
     assert_eq!(report["left_behind"], 0);
     assert!(report["way_m"].as_f64() > Some(0.0), "{report:#}");
-    assert!(report["wheels_checked"].as_u64() > Some(0), "{report:#}");
+    let chain = ["base-driver", "collision-avoidance", "controller", "tof-driver"];
+    assert!(chain.iter().all(|role| report["wheels"][role]["in_time"].as_u64() > Some(0)), "{report:#}");
 }
 
 #[test]
