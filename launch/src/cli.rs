@@ -551,6 +551,49 @@ mod tests {
         Cli::command().debug_assert();
     }
 
+    /// Every line of a help text that begins with the command's name, without what it is for.
+    fn examples(command: &clap::Command) -> Vec<String> {
+        let mut texts: Vec<String> = [command.get_after_help(), command.get_after_long_help()]
+            .into_iter()
+            .flatten()
+            .map(ToString::to_string)
+            .collect();
+        let below: Vec<String> = command.get_subcommands().flat_map(examples).collect();
+        let own = texts.iter_mut().flat_map(|text| {
+            let lines = text.lines().map(str::trim).filter(|line| line.starts_with("launch "));
+            lines.map(|line| line.split("  ").next().unwrap_or(line).to_owned()).collect::<Vec<_>>()
+        });
+        own.collect::<Vec<_>>().into_iter().chain(below).collect()
+    }
+
+    /// The words of a line as a shell takes them, up to a pipe or a redirection.
+    fn words(line: &str) -> Vec<String> {
+        let mut words = vec![String::new()];
+        let mut quote = None;
+        for letter in line.chars() {
+            match (quote, letter) {
+                (Some(open), letter) if letter == open => quote = None,
+                (None, '\'' | '"') => quote = Some(letter),
+                (None, '|' | '>') => break,
+                (None, ' ') => words.push(String::new()),
+                (_, letter) => words.last_mut().unwrap().push(letter),
+            }
+        }
+        words.retain(|word| !word.is_empty());
+        words
+    }
+
+    #[test]
+    fn every_example_of_the_help_is_a_command() {
+        let examples = examples(&Cli::command());
+        assert!(examples.len() > 25, "{examples:?}");
+        for example in examples {
+            if let Err(error) = Cli::try_parse_from(words(&example)) {
+                panic!("`{example}`: {error}");
+            }
+        }
+    }
+
     #[test]
     fn overrides_reach_the_checker() {
         let cli = Cli::parse_from([

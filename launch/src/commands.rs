@@ -160,7 +160,9 @@ fn find_logs(args: &LogsArgs) -> Result<Logs, String> {
     let board = args.running.board.as_deref();
     if !args.last {
         sweep(board)?;
-        if !control::running().is_empty() {
+        let running = control::running();
+        let is_up = board.is_none_or(|board| running.iter().any(|place| place.name() == board));
+        if is_up && !running.is_empty() {
             let place = choose(board)?;
             let status = status_of(&place)?;
             let roles = status.services.iter().map(|service| service.role.clone()).collect();

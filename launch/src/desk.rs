@@ -16,6 +16,8 @@ use std::time::Duration;
 
 /// Between two words of how everything stands.
 const TELL: Duration = Duration::from_millis(100);
+/// Between two signs of life of a run in logical time.
+const SIGN_OF_LIFE: Duration = Duration::from_secs(5);
 /// Questions that are answered at once; the others wait for the next time.
 const CALLS: usize = 16;
 
@@ -42,13 +44,24 @@ pub(crate) struct Desk<'a> {
     face: Face,
     ear: Option<Ear>,
     next_word: Time,
+    next_sign: Time,
 }
 
 impl<'a> Desk<'a> {
     /// A desk for a run that is about to begin; it hears and shows nothing yet.
     pub(crate) fn new(graph: &'a Checked, console: Console, signals: &'a Signals, face: Face) -> Self {
         let lines = Lines::new(console.clone(), face == Face::Trouble);
-        Self { console, signals, graph, lines, viewer: None, face, ear: None, next_word: Time::ZERO }
+        Self {
+            console,
+            signals,
+            graph,
+            lines,
+            viewer: None,
+            face,
+            ear: None,
+            next_word: Time::ZERO,
+            next_sign: Time::ZERO,
+        }
     }
 
     /// The board is there: from now on others can ask, and the view is drawn.
@@ -91,6 +104,26 @@ impl<'a> Desk<'a> {
             self.next_word = now.after(TELL);
             self.tell(supervisor, monitor, recording, *tempo);
             self.show_lines(supervisor, monitor);
+            if tempo.is_some() {
+                self.give_sign_of_life(now, supervisor);
+            }
+        }
+    }
+
+    /// In logical time little may happen for a long time of the world.
+    fn give_sign_of_life(&mut self, now: Time, supervisor: &Supervisor) {
+        let first = self.next_sign == Time::ZERO;
+        if now < self.next_sign {
+            return;
+        }
+        self.next_sign = now.after(SIGN_OF_LIFE);
+        if self.face == Face::Lines && !first {
+            let took_s = now.seconds_since(supervisor.began);
+            let logical_s = board::tap::now(supervisor.host.switchboard()).as_secs_f64();
+            let times = logical_s / took_s;
+            self.console.line(&format!(
+                "[{took_s:>9.3}] launch: {logical_s:.1} s of logical time, {times:.0} x real time"
+            ));
         }
     }
 

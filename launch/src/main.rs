@@ -27,6 +27,7 @@ mod rerun;
 mod runs;
 mod shadow;
 mod signals;
+mod standstill;
 mod steering;
 mod summary;
 mod supervise;
@@ -66,9 +67,14 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Command::CleanDead { board } => {
-            // What cannot be cleaned now is cleaned when the board is taken down.
-            let _ = board::host::clean_dead(&board);
-            ExitCode::SUCCESS
+            // What cannot be cleaned now is cleaned when the board is taken down; only a board that cannot be is an error.
+            match board::place::Place::new(&board) {
+                Ok(_) => {
+                    let _ = board::host::clean_dead(&board);
+                    ExitCode::SUCCESS
+                }
+                Err(error) => commands::finish(Err(error.to_string())),
+            }
         }
     }
 }

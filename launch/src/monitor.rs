@@ -3,6 +3,7 @@
 use crate::control::{self, ServiceStatus, Status, Tempo};
 use crate::graph::Checked;
 use crate::record::Recording;
+use crate::standstill::Standstill;
 use crate::supervise::Supervisor;
 use board::host::health_topic;
 use board::tap::{Tap, TapReader};
@@ -23,6 +24,7 @@ pub(crate) struct Monitor {
     samples: HashMap<String, Sample>,
     sampled: Option<Time>,
     summary: Option<RunSummary>,
+    standstill: Standstill,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -49,7 +51,9 @@ impl Monitor {
             health.insert(role, (reader, Health::default()));
         }
         let finish = finish.map(|topic| tap.reader(topic)).transpose()?;
-        Ok(Self { _tap: tap, health, finish, samples: HashMap::new(), sampled: None, summary: None })
+        let standstill = Standstill::new(&tap);
+        let samples = HashMap::new();
+        Ok(Self { _tap: tap, health, finish, samples, sampled: None, summary: None, standstill })
     }
 
     /// Takes in what came since the last look.
@@ -66,6 +70,11 @@ impl Monitor {
         if self.sampled.is_none_or(|last| now.since(last) >= SAMPLE_PERIOD) {
             self.sample(supervisor, now);
         }
+    }
+
+    /// What keeps the wheels from turning, when it lasts or is over: an event, and whether it is trouble.
+    pub(crate) fn standstill(&mut self, now: Time) -> Option<(String, bool)> {
+        self.standstill.look(now)
     }
 
     /// The referee's last word.

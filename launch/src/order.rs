@@ -1,5 +1,6 @@
 //! `launch order`: something is wanted of the robot, and whether it will do it.
 
+use crate::console::harmless;
 use board::clock;
 use board::place::Place;
 use board::tap::{Tap, TapReader};
@@ -29,7 +30,7 @@ pub(crate) fn order(place: Place, room: &str) -> Result<String, String> {
     let order = serde_json::json!({"room": room, "order_id": order_id});
     let bytes = topic.message.from_json(&order).map_err(|error| {
         if room.len() > size_of::<Order>() - size_of::<u64>() {
-            format!("there is no room `{room}`: no room has so long a name")
+            format!("there is no room `{}`: no room has so long a name", harmless(room))
         } else {
             error.to_string()
         }
@@ -51,7 +52,8 @@ pub(crate) fn order(place: Place, room: &str) -> Result<String, String> {
     }
     match reports {
         Some(_) => Err(format!(
-            "nobody says whether `{room}` is served: who takes the orders is down, or logical time stands still"
+            "nobody says whether `{}` is served: who takes the orders is down, or logical time stands still",
+            harmless(room)
         )),
         // A robot that takes orders without a word.
         None => Ok(format!("ordered: {room}")),
@@ -71,7 +73,7 @@ fn report_of(reports: &mut TapReader, order_id: u64) -> Option<OrderReport> {
 
 fn judge(report: &OrderReport, room: &str) -> Result<String, String> {
     match report.state.get() {
-        Ok(OrderStateName::Refused) => Err(report.remark.to_string()),
+        Ok(OrderStateName::Refused) => Err(harmless(report.remark.as_str())),
         Ok(_) if report.before == 0 => Ok(format!("ordered: {room}")),
         Ok(_) => Ok(format!("ordered: {room}, after {} that wait", report.before)),
         Err(error) => Err(error.to_string()),

@@ -195,6 +195,9 @@ fn watch(
         if now >= next_look {
             next_look = now.after(std::time::Duration::from_millis(100));
             monitor.update(supervisor);
+            if let Some((text, is_trouble)) = monitor.standstill(now).filter(|_| announced) {
+                supervisor.note("", text, is_trouble);
+            }
             if let Some(trouble) = recording.as_mut().and_then(Recording::trouble) {
                 supervisor.note("", format!("the recording cannot go on: {trouble}"), true);
             }

@@ -372,7 +372,8 @@ impl Running {
     /// The last lines of every service's log.
     pub fn logs(&self) -> String {
         let mut text = String::new();
-        for entry in std::fs::read_dir(&self.logs).into_iter().flatten().flatten() {
+        let entries = std::fs::read_dir(&self.logs).into_iter().flatten().flatten();
+        for entry in entries.filter(|entry| entry.path().extension().is_some_and(|end| end == "log")) {
             let log = std::fs::read_to_string(entry.path()).unwrap_or_default();
             let lines: Vec<&str> = log.lines().collect();
             if !lines.is_empty() {
