@@ -138,7 +138,7 @@ fn hurt(stage: &mut Stage<'_, '_>, args: &ChaosArgs, seed: u64) -> Report {
     let mut due = began.after(Duration::from_secs(3));
     let mut deed = plan.next();
     while report.deeds < args.kills && stage.desk.signals.count() == 0 {
-        stage.step(&mut report);
+        stage.step(&mut report, &mut plan);
         if stage.supervisor.failed().is_some() || stage.supervisor.lost().is_some() {
             break;
         }
@@ -157,7 +157,7 @@ fn hurt(stage: &mut Stage<'_, '_>, args: &ChaosArgs, seed: u64) -> Report {
         && stage.supervisor.failed().is_none()
         && clock::monotonic() < end
     {
-        stage.step(&mut report);
+        stage.step(&mut report, &mut plan);
     }
     let Stage { supervisor, scene, desk, .. } = stage;
     for role in scene.give_up() {
@@ -178,12 +178,15 @@ fn hurt(stage: &mut Stage<'_, '_>, args: &ChaosArgs, seed: u64) -> Report {
 }
 
 impl Stage<'_, '_> {
-    fn step(&mut self, report: &mut Report) {
+    fn step(&mut self, report: &mut Report, plan: &mut Plan) {
         pause(self.supervisor, LOOK);
         let now = clock::monotonic();
         self.scene.look(self.supervisor, now);
         self.scene.keep_it_busy(now);
         for verdict in self.scene.close_wounds(now) {
+            if let Some(victim) = self.scene.shown_nothing(&verdict) {
+                plan.prove_again(victim);
+            }
             report.verdict(verdict);
         }
         self.monitor.update(self.supervisor);

@@ -9,6 +9,8 @@ use std::time::Duration;
 const PAUSE_S: std::ops::Range<f64> = 0.1..0.8;
 /// Between two wounds that are to show that the wheels stop: so long a robot takes to heal and to get under way.
 const BETWEEN_PROOFS_S: f64 = 2.0;
+/// How often a wound that was to show something, and showed nothing, is inflicted again.
+const TRIES_MAX: u32 = 12;
 /// After a wound, a moment at which the successor is just starting.
 const START_UP_S: std::ops::Range<f64> = 0.0..0.06;
 /// How many of the wounds hit the successor in its start-up window.
@@ -52,13 +54,23 @@ pub(super) struct Plan {
     last: Option<usize>,
     /// On whom the wheels depend: each hangs once at the beginning, since a successor is there before the wheels have to stop.
     first: VecDeque<usize>,
+    /// How often nothing was seen.
+    tries: u32,
 }
 
 impl Plan {
     /// For so many services, at least one, of which the wheels depend on these.
     pub(super) fn new(seed: u64, victims: usize, chain: impl IntoIterator<Item = usize>) -> Self {
         let first = chain.into_iter().collect();
-        Self { rng: Pcg64::seed_from_u64(seed), victims: victims.max(1), last: None, first }
+        Self { rng: Pcg64::seed_from_u64(seed), victims: victims.max(1), last: None, first, tries: 0 }
+    }
+
+    /// Lets one on whom the wheels depend hang once more, since nothing was seen the last time; a few times at the most.
+    pub(super) fn prove_again(&mut self, victim: usize) {
+        if self.tries < TRIES_MAX {
+            self.tries += 1;
+            self.first.push_back(victim);
+        }
     }
 
     /// The next deed.
@@ -110,6 +122,9 @@ mod tests {
         assert_eq!((first.victim, first.kind, first.while_driving), (3, Kind::Hang, true));
         assert_eq!((second.victim, second.kind, second.while_driving), (1, Kind::Hang, true));
         assert!(!third.while_driving);
+        (0..100).for_each(|_| plan.prove_again(3));
+        let again = std::iter::repeat_with(|| plan.next()).take_while(|deed| deed.while_driving);
+        assert_eq!(again.filter(|deed| deed.victim == 3).count(), TRIES_MAX as usize);
     }
 
     #[test]

@@ -274,6 +274,7 @@ mod tests {
             role: "guard".to_owned(),
             kind: Kind::Kill,
             in_start_up: false,
+            is_proof: false,
             at: at(0),
             generation: 1,
             link: Link::Word,

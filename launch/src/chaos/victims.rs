@@ -142,6 +142,13 @@ impl Scene {
         self.victims.len()
     }
 
+    /// The victim of a wound that was to show that the wheels stop, and has shown nothing.
+    pub(super) fn shown_nothing(&self, verdict: &Verdict) -> Option<usize> {
+        let nothing = matches!(verdict.stopping, Stopping::Stood | Stopping::HealedFirst | Stopping::Unknown);
+        let role = Some(&verdict.wound.role).filter(|_| verdict.wound.is_proof && nothing)?;
+        self.victims.iter().position(|victim| victim.role == *role)
+    }
+
     /// Those on whom the wheels depend.
     pub(super) fn chain(&self) -> Vec<usize> {
         let victims = self.victims.iter().enumerate();
@@ -201,6 +208,7 @@ impl Scene {
         self.wounds.push(Wound {
             kind: deed.kind,
             in_start_up: deed.in_start_up,
+            is_proof: deed.while_driving,
             at: now,
             generation,
             link: victim.link,
@@ -257,7 +265,8 @@ impl Scene {
         while let Some((envelope, bytes)) = self.truth.as_mut().and_then(TapReader::next) {
             if let Ok(view) = View::<WorldTruth>::parse(bytes) {
                 let stamp = Time::from_nanos(envelope.stamp_ns);
-                self.witness.rims(stamp, view.message.left_mps, view.message.right_mps);
+                let WorldTruth { world_time_s, left_travel_m, right_travel_m, .. } = *view.message;
+                self.witness.rims(stamp, world_time_s, left_travel_m, right_travel_m);
                 self.first_contacts.get_or_insert(view.message.contacts);
                 if self.world.is_some_and(|last| last.contacts < view.message.contacts) {
                     self.contacts_at.push(contact(view.message, view.elements, &self.wounds, now));

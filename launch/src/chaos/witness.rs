@@ -9,7 +9,7 @@ use messages::Time;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// A rim slower than this stands; its true speed shivers a little with the ground.
+/// A wheel slower than this stands.
 const STANDS_MPS: f64 = 2e-3;
 /// A robot that is slower than this when somebody is hit proves nothing.
 const DRIVES_MPS: f64 = 0.05;
@@ -64,6 +64,8 @@ pub(super) struct Wound {
     pub(super) role: String,
     pub(super) kind: Kind,
     pub(super) in_start_up: bool,
+    /// It is to show that the wheels stop.
+    pub(super) is_proof: bool,
     pub(super) at: Time,
     /// The generation that was hit: a newer one is the successor's.
     pub(super) generation: u32,
@@ -124,6 +126,8 @@ pub(super) enum Stopping {
 pub(super) struct Witness {
     told: VecDeque<Speeds>,
     rims: VecDeque<Speeds>,
+    /// The world's time and the ways of both rims at the last look.
+    last: Option<[f64; 3]>,
     /// Moments at which messages were missed.
     gaps: VecDeque<Time>,
     period: Duration,
@@ -140,9 +144,16 @@ impl Witness {
         keep(&mut self.told, at, left_mps, right_mps);
     }
 
-    /// The rims have these true speeds.
-    pub(super) fn rims(&mut self, at: Time, left_mps: f64, right_mps: f64) {
-        keep(&mut self.rims, at, left_mps, right_mps);
+    /// The rims have gone so far at this moment of the world's time. Their speed is what they went since the last look: over the ground it shivers with the slip.
+    pub(super) fn rims(&mut self, at: Time, world_s: f64, left_m: f64, right_m: f64) {
+        let Some([last_s, last_left_m, last_right_m]) = self.last.replace([world_s, left_m, right_m]) else {
+            return;
+        };
+        let passed_s = world_s - last_s;
+        // A world that began anew says nothing of what was before.
+        if passed_s > 0.0 && passed_s < 1.0 {
+            keep(&mut self.rims, at, (left_m - last_left_m) / passed_s, (right_m - last_right_m) / passed_s);
+        }
     }
 
     /// Messages were lost shortly before this moment.
@@ -205,8 +216,8 @@ impl Witness {
         let after: Vec<&Speeds> =
             self.rims.iter().filter(|rims| rims.at >= slowing && in_charge(rims.at)).collect();
         for pair in after.windows(2) {
-            // Nobody tells them to, so no rim gains speed; a hundredth of the way is the ground's.
-            if pair[1].fastest_mps > pair[0].fastest_mps + STANDS_MPS + 0.01 * speed_mps {
+            // Nobody tells them to, so no rim gains speed.
+            if pair[1].fastest_mps > pair[0].fastest_mps + STANDS_MPS {
                 let ms = pair[1].at.since(wound.at).as_millis();
                 let [before, now] = [pair[0].fastest_mps, pair[1].fastest_mps];
                 return Stopping::Broken(format!(
@@ -216,7 +227,7 @@ impl Witness {
         }
         for rims in after {
             let braked_s = rims.at.since(slowing).as_secs_f64();
-            let most_mps = (speed_mps - BRAKES_M_PER_S2 * braked_s).max(0.0) + STANDS_MPS + 0.02 * speed_mps;
+            let most_mps = (speed_mps - BRAKES_M_PER_S2 * braked_s).max(0.0) + STANDS_MPS;
             if rims.fastest_mps > most_mps {
                 let ms = rims.at.since(wound.at).as_millis();
                 return Stopping::Broken(format!(
@@ -251,6 +262,7 @@ mod tests {
             role: "controller".to_owned(),
             kind: Kind::Kill,
             in_start_up: false,
+            is_proof: false,
             at: at(1000),
             generation: 1,
             link,
@@ -265,11 +277,16 @@ mod tests {
 
     /// Rims that drive at 0.3 m/s until they begin to brake with this deceleration.
     fn driving(brake_from_ms: u64, brake_m_per_s2: f64) -> Witness {
+        moving(|ms| (0.3 - brake_m_per_s2 * ms.saturating_sub(brake_from_ms) as f64 * 1e-3).max(0.0))
+    }
+
+    /// A robot that turns on the spot with this speed of its rims, seen every 20 ms.
+    fn moving(speed_mps: impl Fn(u64) -> f64) -> Witness {
         let mut witness = Witness::new(Duration::from_millis(20));
-        for ms in (500..4000_u64).step_by(20) {
-            let braked_s = ms.saturating_sub(brake_from_ms) as f64 * 1e-3;
-            let speed_mps = (0.3 - brake_m_per_s2 * braked_s).max(0.0);
-            witness.rims(at(ms), speed_mps, -speed_mps);
+        let mut way_m = 0.0;
+        for ms in (500..4000).step_by(20) {
+            witness.rims(at(ms), ms as f64 * 1e-3, way_m, -way_m);
+            way_m += 0.02 * speed_mps(ms + 20);
         }
         witness
     }
@@ -323,18 +340,13 @@ mod tests {
 
     #[test]
     fn rims_that_gain_speed_are_not_braking() {
-        let mut witness = Witness::new(Duration::from_millis(20));
-        for ms in (500..4000).step_by(20) {
-            let speed_mps = if ms > 1200 { 0.3 } else { 0.1 };
-            witness.rims(at(ms), speed_mps, speed_mps);
-        }
+        let witness = moving(|ms| if ms > 1200 { 0.3 } else { 0.1 });
         check(&witness, &wound(Link::Word, None), "rims gained speed 220 ms later");
     }
 
     #[test]
     fn a_robot_that_stands_proves_nothing_and_what_was_not_seen_is_not_known() {
-        let mut standing = Witness::new(Duration::from_millis(20));
-        (500..4000).step_by(20).for_each(|ms| standing.rims(at(ms), 0.0, 0.01));
+        let standing = moving(|_| 0.01);
         check(&standing, &wound(Link::Driver, None), "Stood");
         check(&Witness::default(), &wound(Link::Driver, None), "Unknown");
         let mut lossy = driving(1060, 0.8);
