@@ -33,7 +33,7 @@ use victims::Scene;
 
 /// The set must be whole so long after the last deed.
 const HEAL_LIMIT: Duration = Duration::from_secs(10);
-/// For so long a deed that is to stop the wheels waits for wheels that turn.
+/// For so long, all in all, deeds that are to stop the wheels wait for wheels that turn.
 const DRIVES_WITHIN: Duration = Duration::from_secs(20);
 /// Between two pictures of the progress.
 const BAR_PERIOD: Duration = Duration::from_millis(100);
@@ -137,6 +137,7 @@ fn hurt(stage: &mut Stage<'_, '_>, args: &ChaosArgs, seed: u64) -> Report {
     // The robot gets under way first.
     let mut due = began.after(Duration::from_secs(3));
     let mut deed = plan.next();
+    let (mut waited, mut last) = (Duration::ZERO, began);
     while report.deeds < args.kills && stage.desk.signals.count() == 0 {
         stage.step(&mut report, &mut plan);
         if stage.supervisor.failed().is_some() || stage.supervisor.lost().is_some() {
@@ -144,7 +145,11 @@ fn hurt(stage: &mut Stage<'_, '_>, args: &ChaosArgs, seed: u64) -> Report {
         }
         let now = clock::monotonic();
         // A robot that never gets under way is hurt all the same, and proves nothing.
-        let waits = deed.while_driving && !stage.scene.drives(now) && now < due.after(DRIVES_WITHIN);
+        let waits = deed.while_driving && !stage.scene.drives(now) && waited < DRIVES_WITHIN;
+        if waits && now >= due {
+            waited += now.since(last);
+        }
+        last = now;
         if now >= due && !waits && stage.scene.hit(stage.supervisor, &deed, now) {
             report.deed(&deed);
             deed = plan.next();

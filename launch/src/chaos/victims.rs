@@ -110,9 +110,14 @@ impl Scene {
         let world = graph.view.world.as_ref().and_then(|world| World::load(graph.folder.join(world)).ok());
         let rooms =
             world.iter().flat_map(|world| &world.doors).map(|door| (door.floor, door.room.clone())).collect();
-        let reader = |topic: &str| tap.reader(topic).ok();
-        let (wheels, truth, mission) =
-            (reader(WHEELS), reader(&graph.view.truth), reader(&graph.view.mission));
+        // A topic of another type is none of these.
+        let reader = |topic: &str, name: &str| {
+            let (_, found) = tap.manifest().topic(topic)?;
+            (found.message.name == name).then(|| tap.reader(topic).ok())?
+        };
+        let wheels = reader(WHEELS, AppliedWheels::NAME);
+        let truth = reader(&graph.view.truth, WorldTruth::NAME);
+        let mission = reader(&graph.view.mission, MissionStatus::NAME);
         let orders = tap.publisher(ORDERS).ok();
         Ok(Self {
             victims,
