@@ -179,9 +179,9 @@ Exit code: 0 the same, 1 different, 2 not run.
 
 Examples:
   launch up coffee --lockstep --seed 7 --record a.mcap
-  launch rerun a.mcap                                     is it the same again?
-  launch rerun a.mcap --only planner                      the planner alone, on the recorded inputs
-  launch rerun a.mcap --with controller=window-controller what would this one have done?
+  launch rerun a.mcap                                      is it the same again?
+  launch rerun a.mcap --only planner                       the planner alone, on the recorded inputs
+  launch rerun a.mcap --with controller=window-controller  what would this one have done?
   launch rerun a.mcap --set controller.track_m=0.42 --closed --record b.mcap";
 
 /// Which graph, and what is different about it this time.

@@ -247,18 +247,18 @@ fn draw_short_list(
 /// The guard's signal and the mission; below it the referee's figures, in as many lines as they need.
 fn words_of(snapshot: &Snapshot, width: u16) -> Vec<Line<'static>> {
     let mut lines = Vec::new();
-    let mut spans = Vec::new();
+    let mut groups = Vec::new();
     if let Some(clearance) = &snapshot.clearance {
-        spans.push(match clearance.signal.get() {
+        groups.push(vec![match clearance.signal.get() {
             Ok(Verdict::Go) => Span::from("  GO  ").black().on_green().bold(),
             Ok(Verdict::Stop) => Span::from(" STOP ").white().on_red().bold(),
             Err(_) => Span::from("  ??  ").black().on_yellow().bold(),
-        });
-        spans.push(Span::from(format!(" {:?}", clearance.reason)));
-        spans.push(Span::from(format!("  front {}", distance(clearance.front_m))).dark_gray());
+        }]);
+        groups.push(vec![Span::from(format!(" {:?}", clearance.reason))]);
+        groups.push(vec![Span::from(format!("  front {}", distance(clearance.front_m))).dark_gray()]);
     }
     if let Some(mission) = &snapshot.mission {
-        let gap = if spans.is_empty() { " " } else { "   " };
+        let gap = if groups.is_empty() { " " } else { "   " };
         let room = harmless(mission.room.as_str());
         let goal = if room.is_empty() { String::new() } else { format!(" to {room}") };
         let status = match mission.status.get() {
@@ -266,20 +266,19 @@ fn words_of(snapshot: &Snapshot, width: u16) -> Vec<Line<'static>> {
             Ok(name) => format!("{}{goal}", spaced(&format!("{name:?}"))),
             Err(error) => error.to_string(),
         };
-        spans.push(Span::from(format!("{gap}{status}")).bold());
+        let mut group = vec![Span::from(format!("{gap}{status}")).bold()];
         if mission.distance_m.is_finite() && !room.is_empty() {
-            spans.push(Span::from(format!(", {:.1} m to go", mission.distance_m)));
+            group.push(Span::from(format!(", {:.1} m to go", mission.distance_m)));
         }
-        spans.push(
-            Span::from(format!("   delivered {}, waiting {}", mission.delivered, mission.waiting))
-                .dark_gray(),
-        );
+        groups.push(group);
+        let counts = format!("   delivered {}, waiting {}", mission.delivered, mission.waiting);
+        groups.push(vec![Span::from(counts).dark_gray()]);
         if !mission.remark.is_empty() {
-            spans.push(Span::from(format!("   {}", harmless(mission.remark.as_str()))).yellow());
+            groups.push(vec![Span::from(format!("   {}", harmless(mission.remark.as_str()))).yellow()]);
         }
     }
-    if !spans.is_empty() {
-        lines.push(Line::from(spans));
+    if !groups.is_empty() {
+        lines.extend(wrapped(groups, usize::from(width)));
     }
     if let Some(summary) = &snapshot.summary {
         let mut words = vec![match summary.state.get() {
