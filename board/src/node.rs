@@ -3,12 +3,12 @@
 use crate::host::{health_topic, shadow_role, shadow_topic};
 use crate::interface::{Direction, PortDescription};
 use crate::kept::{Home, Kept};
-use crate::manifest::Manifest;
+use crate::manifest::{ELEMENTS, Manifest};
 use crate::place::Place;
 use crate::port::{Latest, Publisher, PublisherLink, Queue, Reader, ReaderLink};
 use crate::shared::Shared;
 use crate::switchboard::Switchboard;
-use crate::transport::{Member, TransportError};
+use crate::transport::{Member, Room, TransportError};
 use messages::Message;
 use serde::{Serialize, de::DeserializeOwned};
 use std::rc::Rc;
@@ -146,10 +146,11 @@ impl Joined {
         &mut self,
         topic: &str,
         fingerprint: u64,
-        bytes: usize,
+        grows: bool,
     ) -> Result<PublisherLink, JoinError> {
-        let (index, _) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
-        let publisher = Rc::new(self.member.open(topic, fingerprint)?.publisher(bytes)?);
+        let (index, entry) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
+        let room = Room { bytes: entry.room_bytes(), grows };
+        let publisher = Rc::new(self.member.open(topic, fingerprint)?.publisher(room)?);
         let link =
             PublisherLink { shared: Rc::clone(&self.shared), topic: index, publisher, measures: false };
         self.publishers.push(link.clone());
@@ -278,7 +279,20 @@ impl Node {
     /// # Errors
     /// When the topic is not on the board, carries messages of another layout, or belongs to another service.
     pub fn publisher<T: Message>(&mut self, topic: &str) -> Result<Publisher<T>, JoinError> {
-        self.publisher_of(topic, false)
+        self.publisher_of(topic, false, ELEMENTS)
+    }
+
+    /// As `publisher`, for messages of up to so many elements. Their memory is reserved before the robot starts; that of longer ones is asked
+    /// for when they come, and may not be there.
+    ///
+    /// # Errors
+    /// As `publisher`.
+    pub fn publisher_holding<T: Message>(
+        &mut self,
+        topic: &str,
+        elements: usize,
+    ) -> Result<Publisher<T>, JoinError> {
+        self.publisher_of(topic, false, elements)
     }
 
     /// As `publisher`, for readings of the world: their age begins with their publication, whatever else was read in the same step. Without it the age of
@@ -287,11 +301,16 @@ impl Node {
     /// # Errors
     /// As `publisher`.
     pub fn sensor_publisher<T: Message>(&mut self, topic: &str) -> Result<Publisher<T>, JoinError> {
-        self.publisher_of(topic, true)
+        self.publisher_of(topic, true, ELEMENTS)
     }
 
-    fn publisher_of<T: Message>(&mut self, topic: &str, measures: bool) -> Result<Publisher<T>, JoinError> {
-        self.describe::<T>(topic, Direction::Publish, true, 0);
+    fn publisher_of<T: Message>(
+        &mut self,
+        topic: &str,
+        measures: bool,
+        elements: usize,
+    ) -> Result<Publisher<T>, JoinError> {
+        self.describe::<T>(topic, Direction::Publish, true, 0, if T::HAS_ELEMENTS { elements } else { 0 });
         let role = self.role.clone();
         let Some(joined) = &mut self.joined else { return Ok(Publisher::new(topic, None)) };
         let (role, topic) =
@@ -302,10 +321,7 @@ impl Node {
         if let Some(publisher) = owner.filter(|owner| *owner != role) {
             return Err(JoinError::SecondPublisher { topic: topic.to_owned(), publisher, role });
         }
-        // Room for a few dozen elements from the start; the memory grows by itself.
-        let bytes =
-            if T::HAS_ELEMENTS { size_of::<T>() + 64 * size_of::<T::Element>() } else { size_of::<T>() };
-        let mut link = joined.open_publisher(topic, fingerprint, bytes)?;
+        let mut link = joined.open_publisher(topic, fingerprint, T::HAS_ELEMENTS)?;
         link.measures = measures;
         if let Some(entry) = joined.shared.switchboard.topic(link.topic)
             && link.is_heard()
@@ -353,7 +369,7 @@ impl Node {
         required: bool,
         depth: usize,
     ) -> Result<Option<ReaderLink>, JoinError> {
-        self.describe::<T>(topic, direction, required, depth);
+        self.describe::<T>(topic, direction, required, depth, 0);
         let Some(joined) = &self.joined else { return Ok(None) };
         if !required && joined.manifest.topic(topic).is_none() {
             return Ok(None);
@@ -362,7 +378,14 @@ impl Node {
         Ok(Some(joined.open_reader(topic, fingerprint, depth)?))
     }
 
-    fn describe<T: Message>(&mut self, topic: &str, direction: Direction, required: bool, depth: usize) {
+    fn describe<T: Message>(
+        &mut self,
+        topic: &str,
+        direction: Direction,
+        required: bool,
+        depth: usize,
+        elements: usize,
+    ) {
         let message = T::description();
         let fingerprint = format!("{:016x}", message.fingerprint());
         self.ports.push(PortDescription {
@@ -370,6 +393,7 @@ impl Node {
             direction,
             required,
             depth,
+            elements,
             wakes: false,
             message,
             fingerprint,

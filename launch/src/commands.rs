@@ -56,7 +56,7 @@ pub(crate) fn top(args: &StatusArgs) -> Outcome {
     loop {
         let status = match status_of(&place) {
             Ok(status) => status,
-            Err(_) if host::living_launcher(&place).is_none() => {
+            Err(_) if !control::is_up(&place)? => {
                 println!("the board `{}` is down", place.name());
                 return Ok(());
             }
@@ -105,7 +105,7 @@ pub(crate) fn logs(args: &LogsArgs) -> Outcome {
         }
         positions.insert(role.clone(), text.len() as u64);
     }
-    while args.follow && host::living_launcher(&place).is_some() {
+    while args.follow && control::is_up(&place)? {
         for role in &roles {
             let from = positions.entry(role.clone()).or_default();
             let more = read_from(&log_file(&status, role), from);
@@ -131,7 +131,7 @@ pub(crate) fn stop(args: &StopArgs) -> Outcome {
     let place = control::choose(args.running.board.as_deref())?;
     control::ask(&place, &Request::Stop { fast: args.fast })?;
     let deadline = clock::monotonic().after(Duration::from_secs(30));
-    while host::living_launcher(&place).is_some() {
+    while control::is_up(&place)? {
         if clock::monotonic() > deadline {
             return Err(format!("the board `{}` does not come down", place.name()));
         }

@@ -4,7 +4,7 @@
 use crate::graph::Overrides;
 use crate::supervise::{Event, Phase, SwapRequest, SwapState};
 use board::host;
-use board::place::{self, Place};
+use board::place::Place;
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufRead as _, BufReader, Write as _};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -195,9 +195,12 @@ pub(crate) fn ask(place: &Place, request: &Request) -> Result<Answer, String> {
     }
 }
 
-/// The boards that are up.
-pub(crate) fn running() -> Vec<Place> {
-    place::places().into_iter().filter(|place| host::living_launcher(place).is_some()).collect()
+/// Whether the launcher of a board lives.
+///
+/// # Errors
+/// When that cannot be told.
+pub(crate) fn is_up(place: &Place) -> Result<bool, String> {
+    host::living_launcher(place).map(|launcher| launcher.is_some()).map_err(|error| error.to_string())
 }
 
 /// The board that is meant: the one named, or the only one that is up.
@@ -205,7 +208,7 @@ pub(crate) fn running() -> Vec<Place> {
 /// # Errors
 /// When it is not up, or the choice is not clear.
 pub(crate) fn choose(name: Option<&str>) -> Result<Place, String> {
-    let mut running = running();
+    let mut running = host::boards_up().map_err(|error| error.to_string())?;
     let names = || running.iter().map(|place| format!("`{}`", place.name())).collect::<Vec<_>>().join(", ");
     match name {
         Some(name) => match running.iter().position(|place| place.name() == name) {

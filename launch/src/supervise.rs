@@ -471,7 +471,8 @@ impl Supervisor {
         let lockstep = self.host.switchboard().header().lockstep.load(Ordering::Relaxed) != 0;
         let silence = match process.ready {
             Some(_) if lockstep => return,
-            Some(_) => now.since(slot.heartbeat()),
+            // Of a place that says nonsense nothing can be told; the process writes over it at its next look.
+            Some(_) => slot.silence(now).unwrap_or_default(),
             None if now.since(process.started) > START_LIMIT => now.since(process.started),
             None => return,
         };
@@ -517,6 +518,7 @@ fn topic_of(topic: &CheckedTopic) -> Topic {
         publisher: topic.publisher.role().map(str::to_owned),
         readers: topic.readers.iter().map(|reader| reader.role.clone()).collect(),
         depth: topic.depth,
+        elements: topic.elements,
         message: topic.message.clone(),
     }
 }
@@ -527,6 +529,7 @@ fn health_of(role: &str) -> Topic {
         publisher: Some(role.to_owned()),
         readers: Vec::new(),
         depth: 4,
+        elements: 0,
         message: Health::description(),
     }
 }

@@ -27,6 +27,7 @@ pub(crate) fn topic<T: Message>(name: &str, publisher: Option<&str>, depth: usiz
         publisher: publisher.map(str::to_owned),
         readers: vec![],
         depth,
+        elements: 64,
         message: T::description(),
     }
 }

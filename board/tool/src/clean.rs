@@ -2,8 +2,8 @@
 
 use crate::{Common, Outcome, show};
 use board::clock;
-use board::host::{living_launcher, sweep};
-use board::place::{Place, places};
+use board::host::{boards_up, sweep};
+use board::place::Place;
 use serde_json::json;
 use std::io;
 use std::process::{Command, ExitCode, Stdio};
@@ -15,7 +15,7 @@ const LIMIT: Duration = Duration::from_secs(5);
 pub(crate) fn run(common: &Common) -> Outcome {
     let swept = sweep()?;
     let mut up = Vec::new();
-    for place in places().into_iter().filter(|place| living_launcher(place).is_some()) {
+    for place in boards_up()? {
         let cleaned = clean_dead(&place)?;
         up.push((place.name().to_owned(), cleaned));
     }

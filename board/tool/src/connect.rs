@@ -1,7 +1,7 @@
 //! Which board is meant, and a place on it.
 
 use crate::{Common, clean};
-use board::host::living_launcher;
+use board::host::boards_up;
 use board::manifest::{Manifest, Topic};
 use board::place::{Place, places};
 use board::switchboard::{Slot, SlotState, Switchboard, process_lives};
@@ -26,7 +26,7 @@ pub(crate) enum ConnectError {
 
 /// The board that is meant.
 pub(crate) fn choose(common: &Common) -> Result<Place, Box<dyn Error>> {
-    let up: Vec<Place> = places().into_iter().filter(|place| living_launcher(place).is_some()).collect();
+    let up = boards_up()?;
     let names: Vec<String> = up.iter().map(|place| place.name().to_owned()).collect();
     if let Some(name) = &common.board {
         let place = Place::new(name)?;

@@ -262,23 +262,27 @@ fn boards() -> Vec<Finding> {
     let mut findings = Vec::new();
     for place in places() {
         match living_launcher(&place) {
-            None => findings.push(warn(
+            Err(error) => findings.push(problem(
+                &format!("board {}", place.name()),
+                error.to_string(),
+                "nothing of it was touched",
+            )),
+            Ok(None) => findings.push(warn(
                 &format!("board {}", place.name()),
                 "its launcher is gone, and its remains are still here",
                 "`board clean` ends its services and removes it",
             )),
-            Some(pid) => findings.extend(board(&place, pid)),
+            Ok(Some(pid)) => findings.extend(board(&place, pid)),
         }
     }
-    let orphans = orphans();
-    findings.push(if orphans.is_empty() {
-        ok("leftovers", "no shared memory without a board")
-    } else {
-        warn(
+    findings.push(match orphans() {
+        Ok(orphans) if orphans.is_empty() => ok("leftovers", "no shared memory without a board"),
+        Ok(orphans) => warn(
             "leftovers",
             format!("{} files in /dev/shm belong to no board", orphans.len()),
             "`board clean` removes them",
-        )
+        ),
+        Err(error) => problem("leftovers", error.to_string(), "nothing of them was touched"),
     });
     findings
 }
@@ -334,9 +338,8 @@ fn services(check: &str, manifest: &Manifest, switchboard: &Switchboard) -> Vec<
     let mut seen = Vec::new();
     for (_, slot) in switchboard.taken().filter(|(_, slot)| slot.is_service.load(Ordering::Relaxed) != 0) {
         let (role, pid) = (slot.role(), slot.pid.load(Ordering::Relaxed));
-        let silent = now.since(slot.heartbeat());
-        let since = slot.step_since_ns.load(Ordering::Relaxed);
-        let in_step = if since == 0 { Duration::ZERO } else { now.since(Time::from_nanos(since)) };
+        let silent = slot.silence(now).unwrap_or_default();
+        let in_step = slot.in_step(now).unwrap_or_default();
         let restart = format!("`launch restart {role}`");
         match life(slot) {
             Life::Dead => findings.push(problem(

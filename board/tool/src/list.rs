@@ -104,9 +104,8 @@ fn services(common: &Common, look: &Look) -> std::io::Result<()> {
         let is_service = slot.is_service.load(Ordering::Relaxed) != 0;
         let (life, state) = (life(slot), format!("{:?}", slot.state()).to_lowercase());
         let pid = slot.pid.load(Ordering::Relaxed);
-        let heartbeat_ns = now.since(slot.heartbeat()).as_nanos() as f64;
-        let since = slot.step_since_ns.load(Ordering::Relaxed);
-        let in_step_ns = (since != 0).then(|| now.since(Time::from_nanos(since)).as_nanos() as f64);
+        let heartbeat_ns = slot.silence(now).map(|silence| silence.as_nanos() as f64);
+        let in_step_ns = slot.in_step(now).map(|passed| passed.as_nanos() as f64);
         let steps = slot.steps.load(Ordering::Relaxed);
         all.push(json!({
             "service": slot.role(), "tool": !is_service, "slot": slot_number, "state": state, "life": life, "pid": pid,
@@ -123,7 +122,7 @@ fn services(common: &Common, look: &Look) -> std::io::Result<()> {
             pid.to_string(),
             steps.to_string(),
             in_step_ns.map_or("-".into(), show::duration),
-            if slot.heartbeat() == Time::ZERO { "-".into() } else { show::duration(heartbeat_ns) },
+            heartbeat_ns.map_or("-".into(), show::duration),
         ]);
     }
     for name in &look.manifest.services {

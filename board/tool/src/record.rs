@@ -149,7 +149,7 @@ impl Session<'_> {
             }
             if now.since(looked) >= ALIVE {
                 looked = now;
-                if living_launcher(self.place).is_none() {
+                if living_launcher(self.place)?.is_none() {
                     board_went = true;
                     break;
                 }

@@ -15,6 +15,7 @@ fn host(name: &str) -> Host {
         publisher: Some("somebody".into()),
         readers: vec![],
         depth: 64,
+        elements: 64,
         message,
     };
     let topics = vec![
