@@ -5,7 +5,7 @@
 
 use crate::clock;
 use crate::host::{Host, SWITCHBOARD, role_of};
-use crate::private::{Identity, identity};
+use crate::private::{Version, identity};
 use crate::manifest::Manifest;
 use crate::switchboard::{SLOTS, Slot};
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,7 +28,7 @@ pub(crate) struct Known {
     /// Whose messages count: the place and the generation, by role.
     speakers: BTreeMap<String, (u32, u32)>,
     /// The file of the table of contents, as it was last written.
-    pub(crate) manifest_file: Option<Identity>,
+    pub(crate) manifest_file: Option<Version>,
     /// What cannot be mended, and was said.
     said: BTreeSet<String>,
 }
@@ -190,7 +190,7 @@ impl Host {
                 found.push(text);
             }
         }
-        let was_replaced = Manifest::identity(&self.place) != self.known().manifest_file;
+        let was_replaced = Manifest::version(&self.place) != self.known().manifest_file;
         if was_replaced && self.is_in_place() {
             let outcome = match self.write_manifest() {
                 Ok(()) => "is written again".to_owned(),

@@ -8,7 +8,7 @@ use crate::lack::{Lack, SHARED_MEMORY};
 use crate::lock::{self, Lock};
 use crate::manifest::{Manifest, Topic};
 use crate::place::{InvalidBoardName, Place, Turn};
-use crate::private::{Identity, identity};
+use crate::private::{self, Identity, identity};
 use crate::sweep::clear_away;
 use crate::switchboard::{self, SlotState, Switchboard};
 use crate::transport::{Member, RawTopic, TopicShape, TransportError};
@@ -19,6 +19,7 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+pub use crate::need::needed_bytes;
 pub use crate::sweep::{Swept, boards_up, clean_dead, clear, half_made, living_launcher, sweep, sweep_named};
 
 pub(crate) const SWITCHBOARD: &str = "switchboard";
@@ -154,6 +155,12 @@ impl Host {
         for topic in &manifest.topics {
             topics.push(member.create(&topic.name, shape_of(topic))?);
         }
+        // The transport's folders, which it makes readable for the user's group.
+        for entry in std::fs::read_dir(place.root()).into_iter().flatten().flatten() {
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                private::close_folder(&entry.path())?;
+            }
+        }
         let manifest = Manifest { launcher_pid: std::process::id(), ..manifest };
         let host = Self {
             page_file: identity(&place.file(SWITCHBOARD)),
@@ -173,7 +180,7 @@ impl Host {
 
     pub(crate) fn write_manifest(&self) -> io::Result<()> {
         self.manifest.write(&self.place)?;
-        self.known().manifest_file = Manifest::identity(&self.place);
+        self.known().manifest_file = Manifest::version(&self.place);
         Ok(())
     }
 

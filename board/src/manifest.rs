@@ -3,7 +3,7 @@
 //! The launcher writes it before any service lives. With it, any tool can read every topic, also those of services it never heard of.
 
 use crate::place::Place;
-use crate::private::{self, Identity, identity};
+use crate::private::{self, Version, version};
 use messages::{Description, elements_offset};
 use serde::{Deserialize, Serialize};
 use std::io;
@@ -76,9 +76,9 @@ impl Manifest {
         private::replace(&place.file(FILE), &serde_json::to_vec(self)?)
     }
 
-    /// Which file it is that lies there: another one after every change, since it is replaced, not written over.
-    pub(crate) fn identity(place: &Place) -> Option<Identity> {
-        identity(&place.file(FILE))
+    /// Tells whether it has changed since.
+    pub(crate) fn version(place: &Place) -> Option<Version> {
+        version(&place.file(FILE))
     }
 
     /// Reads that of a board.

@@ -4,7 +4,7 @@ use crate::lack::SHARED_MEMORY;
 use crate::{lock, private};
 use std::fs;
 use std::io;
-use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 /// Longest board name, in bytes. The transport takes 60 bytes for folder and prefix together.
@@ -108,7 +108,18 @@ impl Place {
 
     /// Removes the board's files in shared memory outside its folder.
     pub(crate) fn remove_shared_memory(&self) -> io::Result<()> {
-        self.shared_memory().iter().try_for_each(|file| private::remove(file))
+        self.shared_memory().iter().try_for_each(|file| {
+            private::remove(file).map_err(|error| match fs::symlink_metadata(file) {
+                Ok(found) if error.kind() == io::ErrorKind::PermissionDenied => io::Error::new(
+                    error.kind(),
+                    format!(
+                        "{error}; it belongs to user {}: have it removed, or choose another name with --board",
+                        found.uid()
+                    ),
+                ),
+                _ => error,
+            })
+        })
     }
 
     /// The board's files in shared memory outside its folder.
@@ -244,8 +255,7 @@ fn make_boards_folder(folder: &Path) -> io::Result<()> {
                 Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
                 Err(error) => Err(error),
                 Ok(0o700) => Ok(()),
-                Ok(_) => fs::set_permissions(folder, fs::Permissions::from_mode(0o700))
-                    .map_err(private::at(folder)),
+                Ok(_) => private::close_folder(folder),
             }
         }
         other => other,

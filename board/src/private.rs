@@ -41,6 +41,11 @@ pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// When there is something of this name already, or it cannot be made; the error names the folder.
 pub fn create_folder(path: &Path) -> io::Result<()> {
     DirBuilder::new().mode(FOLDER_MODE).create(path).map_err(at(path))?;
+    close_folder(path)
+}
+
+/// Closes a folder that is there to everybody but its owner.
+pub(crate) fn close_folder(path: &Path) -> io::Result<()> {
     std::fs::set_permissions(path, Permissions::from_mode(FOLDER_MODE)).map_err(at(path))
 }
 
@@ -60,6 +65,15 @@ pub(crate) type Identity = (u64, u64);
 pub(crate) fn identity(path: &Path) -> Option<Identity> {
     let found = std::fs::symlink_metadata(path).ok()?;
     Some((found.dev(), found.ino()))
+}
+
+/// A file, and when it was last written.
+pub(crate) type Version = (Identity, i64, i64);
+
+/// Which file stands there, if any, and as of when.
+pub(crate) fn version(path: &Path) -> Option<Version> {
+    let found = std::fs::symlink_metadata(path).ok()?;
+    Some(((found.dev(), found.ino()), found.mtime(), found.mtime_nsec()))
 }
 
 /// Removes a file; that there is none is fine.

@@ -139,6 +139,9 @@ struct Page {
     topics: [TopicEntry; TOPICS],
 }
 
+/// Bytes of the page.
+pub(crate) const PAGE_BYTES: usize = size_of::<Page>();
+
 /// The mapped page.
 pub struct Switchboard {
     page: *const Page,
@@ -163,7 +166,7 @@ impl Switchboard {
     pub fn create(path: &Path) -> io::Result<Self> {
         let file = private::create(path)?;
         // Reserved, not only sized: with shared memory full, this fails, and not the first write into the page (SIGBUS).
-        rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, size_of::<Page>() as u64)
+        rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, PAGE_BYTES as u64)
             .map_err(io::Error::from)
             .map_err(private::at(path))?;
         let board = Self::map(&file).map_err(private::at(path))?;
@@ -182,7 +185,7 @@ impl Switchboard {
     pub fn open(path: &Path) -> io::Result<Self> {
         let unfit = |why: &str| io::Error::new(io::ErrorKind::InvalidData, format!("{}: {why}", path.display()));
         let file = private::open(path)?;
-        if file.metadata().map_err(private::at(path))?.len() != size_of::<Page>() as u64 {
+        if file.metadata().map_err(private::at(path))?.len() != PAGE_BYTES as u64 {
             return Err(unfit("the board was made by another version of Corkboard"));
         }
         let board = Self::map(&file).map_err(private::at(path))?;
@@ -393,6 +396,14 @@ impl Slot {
         if self.state() != SlotState::Running {
             self.set_state(SlotState::Running);
         }
+    }
+
+    /// Keeps a place that this process has claimed for itself.
+    pub(crate) fn hold_claim(&self) {
+        if self.owner() != std::process::id() && !self.is_held() {
+            self.owner.store(std::process::id(), Ordering::Release);
+        }
+        self.hold();
     }
 
     fn set_role(&self, role: &str) {

@@ -6,7 +6,7 @@ use crate::manifest::{Manifest, Topic};
 use crate::node::{JoinError, Joined};
 use crate::place::Place;
 use crate::port::{PublisherLink, ReaderLink};
-use crate::private::Identity;
+use crate::private::Version;
 use crate::switchboard::{SlotState, Switchboard};
 use crate::transport::{Envelope, RawMessage, TransportError};
 use messages::Time;
@@ -23,8 +23,8 @@ pub struct Tap {
     topology: Cell<u32>,
     /// The topics that wake it.
     wakes: RefCell<Vec<u32>>,
-    /// Which file the table of contents was read from.
-    manifest_file: Option<Identity>,
+    /// The table of contents, as it was last read.
+    manifest_file: Option<Version>,
 }
 
 impl std::fmt::Debug for Tap {
@@ -45,7 +45,7 @@ impl Tap {
             Ok(None) => return Err(JoinError::NoBoard { board: board() }),
             Err(source) => return Err(JoinError::Unreadable { board: board(), source }),
         }
-        let manifest_file = Manifest::identity(&place);
+        let manifest_file = Manifest::version(&place);
         let joined = Joined::join(place, tool, None)?;
         if let Some(slot) = joined.shared.own_slot() {
             slot.set_state(SlotState::Running);
@@ -60,7 +60,7 @@ impl Tap {
     /// When it cannot be read.
     pub fn refresh(&mut self) -> Result<Range<usize>, JoinError> {
         let known = self.joined.manifest.topics.len();
-        let file = Manifest::identity(&self.joined.place);
+        let file = Manifest::version(&self.joined.place);
         // While the board is being taken down there is none.
         if file.is_some() && file != self.manifest_file {
             let board = || self.joined.place.name().to_owned();
@@ -111,7 +111,7 @@ impl Tap {
     pub fn wait(&self, heard: u32, timeout: Duration) {
         self.serve_new_readers();
         if let Some(slot) = self.joined.shared.own_slot() {
-            slot.hold();
+            slot.hold_claim();
             self.wakes.borrow().iter().for_each(|&topic| self.joined.shared.keep_awake(topic));
             slot.heartbeat_ns.store(clock::monotonic().as_nanos(), Ordering::Relaxed);
             slot.wait(heard, Some(timeout));

@@ -350,8 +350,15 @@ impl RawTopic {
     }
 }
 
+/// Bytes that a message of so many bytes takes in shared memory, with all that lies in front of it.
+pub(crate) fn message_bytes(bytes: usize) -> usize {
+    type TransportHeader = iceoryx2::service::header::publish_subscribe::Header;
+    let heads = size_of::<TransportHeader>().next_multiple_of(align_of::<Header>()) + size_of::<Header>();
+    heads.next_multiple_of(ALIGNMENT) + blocks(bytes) * ALIGNMENT
+}
+
 /// Blocks that a message of so many bytes takes.
-pub(crate) fn blocks(bytes: usize) -> usize {
+fn blocks(bytes: usize) -> usize {
     bytes.div_ceil(ALIGNMENT).max(1)
 }
 
@@ -408,5 +415,50 @@ impl RawLoan {
     pub(crate) fn send(mut self, envelope: Envelope) -> Result<(), TransportError> {
         *self.sample.user_header_mut() = Header { envelope, length: self.length as u64 };
         self.sample.send().map(|_| ()).map_err(|error| failed("a message cannot be sent")(&error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a reader makes of a message of 100 bytes whose header says that it has so many.
+    fn received(said: u64) -> Result<Vec<u8>, Forged> {
+        let place = Place::new(&format!("t-f-{}-{}", std::process::id(), said % 1000)).unwrap();
+        place.create().unwrap();
+        let member = Member::join(&place).unwrap();
+        let topic = member.create("topic", TopicShape { fingerprint: 1, depth: 2, readers: 1 }).unwrap();
+        let reader = topic.reader(2).unwrap();
+        let publisher = topic.publisher(Room { bytes: 100, grows: false }).unwrap();
+        let mut loan = publisher.loan(100).unwrap();
+        loan.bytes().fill(7);
+        loan.sample.user_header_mut().length = said;
+        loan.sample.send().unwrap();
+        let received = reader.receive().unwrap().map(|message| message.bytes().to_vec());
+        drop((reader, publisher, topic, member));
+        place.remove().unwrap();
+        received
+    }
+
+    #[test]
+    fn a_forged_length_is_no_message() {
+        assert_eq!(received(100), Ok(vec![7; 100]));
+        assert_eq!(received(1), Ok(vec![7]));
+        assert_eq!(received(129), Err(Forged));
+        assert_eq!(received(u64::MAX), Err(Forged));
+    }
+
+    #[test]
+    fn a_fixed_message_has_no_room_to_grow() {
+        let place = Place::new(&format!("t-g-{}", std::process::id())).unwrap();
+        place.create().unwrap();
+        let member = Member::join(&place).unwrap();
+        let topic = member.create("topic", TopicShape { fingerprint: 1, depth: 2, readers: 1 }).unwrap();
+        let fixed = topic.publisher(Room { bytes: 100, grows: false }).unwrap();
+        assert!(fixed.loan(128).is_ok() && fixed.loan(129).is_err());
+        let growing = topic.publisher(Room { bytes: 100, grows: true }).unwrap();
+        assert_eq!(growing.loan(100_000).unwrap().bytes().len(), 100_000);
+        drop((fixed, growing, topic, member));
+        place.remove().unwrap();
     }
 }
