@@ -7,6 +7,7 @@ pub mod arguments;
 pub mod clock;
 pub mod gate;
 pub mod host;
+pub mod logout;
 pub mod manifest;
 pub mod place;
 pub mod private;

@@ -166,6 +166,8 @@ fn count_files(folder: &Path) -> usize {
 /// When the board cannot be joined.
 pub fn clean_dead(name: &str) -> Result<usize, HostError> {
     let place = Place::new(name)?;
+    // Joining would make the transport's part of a board that is not there.
+    place.check()?;
     // Those who died while they made a file leave it half made, and the transport, here and in the services, waits for its end.
     let failed = janitor::beside(&place, || Member::join(&place).map(|member| member.clean()))?;
     if let Ok(switchboard) = Switchboard::open(&place.file(SWITCHBOARD)) {
