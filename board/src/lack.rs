@@ -7,8 +7,7 @@ use crate::segments;
 use crate::terminal::bytes;
 use rustix::fs::{StatVfs, StatVfsMountFlags};
 use rustix::process::{Resource, getrlimit};
-use std::fmt;
-use std::fs;
+use std::{fmt, fs, io};
 
 /// A process that has fewer descriptors left than this has run out of them: a port takes a handful.
 const FILES_SPARE: u64 = 8;
@@ -60,21 +59,30 @@ pub enum Lack {
 impl Lack {
     /// What has run out, if anything has.
     pub fn look() -> Option<Self> {
-        Self::of_files().or_else(Self::of_shared_memory).or_else(Self::of_address_space)
+        Self::of_files(0).or_else(Self::of_shared_memory).or_else(Self::of_address_space)
     }
 
-    /// Whether this process, or the machine, can open hardly any file any more.
-    pub(crate) fn of_files() -> Option<Self> {
-        let limit = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
-        let open = match fs::read_dir("/proc/self/fd") {
-            Ok(entries) => entries.count() as u64,
-            Err(error) => match error.raw_os_error() {
-                Some(libc::EMFILE) => limit,
-                Some(libc::ENFILE) => return Some(Self::FilesOfMachine),
-                _ => return None,
-            },
-        };
-        (limit.saturating_sub(open) < FILES_SPARE).then_some(Self::Files { limit })
+    /// What has run out that makes a call of the system fail so, if anything has.
+    pub fn behind(error: &io::Error) -> Option<Self> {
+        match error.raw_os_error()? {
+            libc::EMFILE => Some(Self::Files { limit: file_limit() }),
+            libc::ENFILE => Some(Self::FilesOfMachine),
+            libc::ENOMEM => Self::of_address_space(),
+            libc::ENOSPC | libc::EROFS => Self::of_shared_memory(),
+            _ => None,
+        }
+    }
+
+    /// Whether this process, or the machine, can open hardly any file beyond so many more.
+    pub(crate) fn of_files(more: u64) -> Option<Self> {
+        let limit = file_limit();
+        match fs::read_dir("/proc/self/fd") {
+            Ok(entries) => {
+                let left = limit.saturating_sub(entries.count() as u64);
+                (left < more + FILES_SPARE).then_some(Self::Files { limit })
+            }
+            Err(error) => Self::behind(&error),
+        }
     }
 
     fn of_shared_memory() -> Option<Self> {
@@ -103,6 +111,11 @@ impl Lack {
     }
 }
 
+/// How many files this process may have open.
+fn file_limit() -> u64 {
+    getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX)
+}
+
 /// How many bytes of a file system are free for this user.
 pub(crate) fn free_bytes(found: &StatVfs) -> u64 {
     found.f_bavail * found.f_frsize
@@ -117,7 +130,7 @@ impl fmt::Display for Lack {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Files { limit } => {
-                write!(f, "this process may open {limit} files, which are all in use; `ulimit -n 1024` allows more")
+                write!(f, "this process may open {limit} files, which are too few; `ulimit -n 1024` allows more")
             }
             Self::FilesOfMachine => write!(
                 f,

@@ -6,6 +6,7 @@
 //! same wheels. So the processes are looked through for one that still has the file open. Whatever keeps us from
 //! looking is an error, and never means that a launcher is gone.
 
+use crate::lack::Lack;
 use crate::place::{self, Place};
 use crate::private::{self, Identity, identity};
 use rustix::fs::{FlockOperation, OFlags, flock};
@@ -46,11 +47,10 @@ impl Lock {
 pub(crate) fn holder(place: &Place) -> io::Result<Option<u32>> {
     let path = place.file(LOCK);
     let doubt = |error: io::Error| {
-        let text = format!(
-            "whether the launcher of `{}` lives cannot be told, so nothing was touched: {error}{}",
-            place.name(),
-            crate::lack::Lack::of_files().map(|lack| format!("; {lack}")).unwrap_or_default()
-        );
+        let lack = Lack::of_files(0).map(|lack| format!("; {lack}")).unwrap_or_default();
+        let name = place.name();
+        let text =
+            format!("whether the launcher of `{name}` lives cannot be told, so nothing was touched: {error}{lack}");
         io::Error::new(error.kind(), text)
     };
     match open(&path) {

@@ -3,6 +3,7 @@
 use crate::host::{health_topic, shadow_role, shadow_topic};
 use crate::interface::{Direction, PortDescription};
 use crate::kept::{Home, Kept};
+use crate::lack::Lack;
 use crate::manifest::{ELEMENTS, Manifest};
 use crate::place::Place;
 use crate::port::{Latest, Publisher, PublisherLink, Queue, Reader, ReaderLink};
@@ -11,6 +12,7 @@ use crate::switchboard::Switchboard;
 use crate::transport::{Member, Room, TransportError};
 use messages::Message;
 use serde::{Serialize, de::DeserializeOwned};
+use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -89,7 +91,12 @@ pub(crate) struct Joined {
     pub(crate) member: Member,
     pub(crate) place: Place,
     pub(crate) publishers: Vec<PublisherLink>,
+    /// Files that its ports may still come to open.
+    expected_files: Cell<u64>,
 }
+
+/// Files that a reader opens for a publisher that it meets.
+const FILES_A_PUBLISHER: u64 = 2;
 
 impl Joined {
     /// Joins the board as `role`, in a slot that the launcher has prepared or in a free one.
@@ -121,7 +128,8 @@ impl Joined {
             }
         })?;
         let shared = Rc::new(Shared::new(switchboard, slot, generation));
-        Ok(Self { shared, manifest, member, place, publishers: Vec::new() })
+        let expected_files = Cell::new(0);
+        Ok(Self { shared, manifest, member, place, publishers: Vec::new(), expected_files })
     }
 
     pub(crate) fn open_reader(
@@ -131,6 +139,7 @@ impl Joined {
         depth: usize,
     ) -> Result<ReaderLink, JoinError> {
         let (index, _) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
+        self.expect_files(topic, FILES_A_PUBLISHER)?;
         let reader = self.member.open(topic, fingerprint)?.reader(depth)?;
         Ok(ReaderLink {
             shared: Rc::clone(&self.shared),
@@ -150,11 +159,22 @@ impl Joined {
     ) -> Result<PublisherLink, JoinError> {
         let (index, entry) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
         let room = Room { bytes: entry.room_bytes(), grows };
+        // One for each reader that it meets, and one for a tool.
+        self.expect_files(topic, entry.readers.len() as u64 + 1)?;
         let publisher = Rc::new(self.member.open(topic, fingerprint)?.publisher(room)?);
         let link =
             PublisherLink { shared: Rc::clone(&self.shared), topic: index, publisher, measures: false };
         self.publishers.push(link.clone());
         Ok(link)
+    }
+
+    /// The others of a topic come later, and whom a process then cannot open a file for hears nothing of it: so it is refused now.
+    fn expect_files(&self, topic: &str, more: u64) -> Result<(), TransportError> {
+        self.expected_files.set(self.expected_files.get() + more);
+        match Lack::of_files(self.expected_files.get()) {
+            Some(lack) => Err(TransportError::lacking(&format!("topic `{topic}` cannot be opened"), lack)),
+            None => Ok(()),
+        }
     }
 
     fn no_topic(&self, topic: &str) -> JoinError {

@@ -5,12 +5,13 @@ use crate::example;
 use crate::health::StepTimes;
 use crate::host;
 use crate::interface::{About, Interface};
+use crate::lack::Lack;
 use crate::node::{JoinError, Joined, Node};
 use crate::place::Place;
 use crate::port::{PublisherLink, bytes_of, release_held};
 use crate::shared::Shared;
 use crate::switchboard::{self, Slot, SlotState};
-use crate::terminal;
+use crate::{terminal, transport};
 use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
 use messages::{Health, Message as _, Parameters, ServiceState, Time};
 use std::error::Error;
@@ -217,6 +218,7 @@ fn serve(
         times: StepTimes::default(),
         steps: 0,
         late_steps: 0,
+        unconnected: transport::unconnected(),
         health,
     };
     shared.computes.set(shared.lockstep && arguments.get_one::<u64>("compute-ns").is_some_and(|&ns| ns > 0));
@@ -271,6 +273,8 @@ struct Service {
     times: StepTimes,
     steps: u64,
     late_steps: u64,
+    /// Ports that could not be connected, as of the last look.
+    unconnected: u64,
     health: Option<PublisherLink>,
 }
 
@@ -288,6 +292,7 @@ impl Service {
             slot.heartbeat_ns.store(now.as_nanos(), Ordering::Relaxed);
             self.hold_place(slot);
             self.serve_new_readers();
+            self.say_unconnected();
             let woken = self.look_for_messages();
             let timer = now >= due;
             if woken || timer {
@@ -437,6 +442,18 @@ impl Service {
             // Whoever came after our last message would sleep on it until the next one.
             if !self.shared.lockstep {
                 self.publishers.iter().for_each(|link| self.shared.switchboard.ring_readers(link.topic));
+            }
+        }
+    }
+
+    /// A reader or a publisher came that this process could not connect to: one of the two hears nothing of the other.
+    fn say_unconnected(&mut self) {
+        let unconnected = transport::unconnected();
+        if unconnected != self.unconnected {
+            self.unconnected = unconnected;
+            // Without a lack it died in the making.
+            if let Some(lack) = Lack::look() {
+                tracing::error!("another process of the board cannot be connected to: {lack}");
             }
         }
     }

@@ -24,12 +24,7 @@ thread_local! {
     static LAST: Cell<u64> = const { Cell::new(0) };
 }
 
-/// How much was asked for in this thread and could not be had since [`take_refused`], in bytes; zero for nothing.
-pub(crate) fn refused() -> u64 {
-    REFUSED.get()
-}
-
-/// As [`refused`], which is zero afterwards.
+/// How much was asked for in this thread and could not be had since the last call, in bytes; zero for nothing.
 pub(crate) fn take_refused() -> u64 {
     REFUSED.take()
 }

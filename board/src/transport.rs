@@ -4,6 +4,7 @@ use crate::lack::Lack;
 use crate::place::Place;
 use crate::segments;
 use iceoryx2::config::Config;
+use iceoryx2::port::{DegradationAction, DegradationCause, DegradationInfo};
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections as _;
@@ -15,6 +16,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::fmt;
 use std::os::unix::fs::MetadataExt as _;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
@@ -76,6 +78,11 @@ pub struct TransportError {
 }
 
 impl TransportError {
+    /// Something cannot be done for want of this.
+    pub(crate) fn lacking(doing: &str, lack: Lack) -> Self {
+        Self { doing: doing.to_owned(), lack: Some(lack), cause: String::new() }
+    }
+
     /// The resource that has run out, if that is why.
     pub fn lack(&self) -> Option<&Lack> {
         self.lack.as_ref()
@@ -86,6 +93,7 @@ impl fmt::Display for TransportError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { doing, lack, cause } = self;
         match (lack, in_words(cause)) {
+            (Some(lack), _) if cause.is_empty() => write!(f, "{doing}: {lack}"),
             (Some(lack), _) => write!(f, "{doing}: {lack} (the transport says {cause})"),
             (None, Some(words)) => write!(f, "{doing}: {words} (the transport says {cause})"),
             (None, None) => write!(f, "{doing}: {cause}"),
@@ -307,12 +315,26 @@ fn retried<T>(mut attempt: impl FnMut() -> Result<T, TransportError>) -> Result<
     attempt()
 }
 
-/// A port that is not connected to all others of its topic because there was no memory for that would miss messages
-/// without a word: the transport makes it all the same.
-fn connected<T>(port: T, doing: &str) -> Result<T, TransportError> {
-    match segments::refused() {
-        0 => Ok(port),
-        _ => Err(failed(doing)(&"not connected to all ports of the topic")),
+/// Ports that could not be connected so far: the transport goes on without a word, and one of the two hears nothing.
+static UNCONNECTED: AtomicU64 = AtomicU64::new(0);
+
+/// How many ports of this process could not be connected so far.
+pub(crate) fn unconnected() -> u64 {
+    UNCONNECTED.load(Ordering::Relaxed)
+}
+
+fn note_unconnected(cause: DegradationCause, _: &DegradationInfo) -> DegradationAction {
+    if matches!(cause, DegradationCause::FailedToEstablishConnection) {
+        UNCONNECTED.fetch_add(1, Ordering::Relaxed);
+    }
+    DegradationAction::Warn
+}
+
+/// A port that was just made, connected to all others of its topic but for such as died in the making.
+fn connected<T>(port: T, before: u64, doing: &str) -> Result<T, TransportError> {
+    match Lack::look().filter(|_| unconnected() > before) {
+        Some(lack) => Err(TransportError::lacking(doing, lack)),
+        None => Ok(port),
     }
 }
 
@@ -322,15 +344,17 @@ impl RawTopic {
         let strategy = if room.grows { AllocationStrategy::PowerOfTwo } else { AllocationStrategy::Static };
         retried(|| {
             segments::take_refused();
+            let before = unconnected();
             let publisher = self
                 .factory
                 .publisher_builder()
                 .initial_max_slice_len(blocks(room.bytes))
                 .allocation_strategy(strategy)
                 .max_loaned_samples(LOANED)
+                .set_degradation_handler(note_unconnected)
                 .create()
                 .map_err(|error| failed(DOING)(&error))?;
-            connected(RawPublisher { publisher }, DOING)
+            connected(RawPublisher { publisher }, before, DOING)
         })
     }
 
@@ -339,13 +363,15 @@ impl RawTopic {
         let most = self.factory.static_config().subscriber_max_buffer_size();
         retried(|| {
             segments::take_refused();
+            let before = unconnected();
             let subscriber = self
                 .factory
                 .subscriber_builder()
                 .buffer_size(depth.clamp(2, most.max(2)))
+                .set_degradation_handler(note_unconnected)
                 .create()
                 .map_err(|error| failed(DOING)(&error))?;
-            connected(RawReader { subscriber }, DOING)
+            connected(RawReader { subscriber }, before, DOING)
         })
     }
 }

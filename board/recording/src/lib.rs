@@ -149,7 +149,7 @@ pub enum RecordingError {
         bytes: u64,
         /// Why.
         #[source]
-        cause: Box<mcap::McapError>,
+        cause: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A topic number that is not in the manifest.
     #[error("{}: there is no topic {index}; the recording has {topics}", path.display())]

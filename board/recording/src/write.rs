@@ -223,7 +223,11 @@ impl Recorder {
         drop(self.writer.take());
         let (messages, bytes) = self.kept;
         let _ = self.file.set_len(bytes);
-        RecordingError::Cut { path: self.path.clone(), messages, bytes, cause: Box::new(cause) }
+        let cause: Box<dyn std::error::Error + Send + Sync> = match cause {
+            mcap::McapError::Io(cause) => Box::new(cause),
+            cause => Box::new(cause),
+        };
+        RecordingError::Cut { path: self.path.clone(), messages, bytes, cause }
     }
 
     /// Keeps a word for the end of the file, such as how many messages were lost; see [`Manifest::notes`].

@@ -379,7 +379,13 @@ fn modes(check: &str, place: &Place, files: &[PathBuf]) -> Option<Finding> {
 
 /// What cannot stand on a page that only sound processes have written to.
 fn page(check: &str, manifest: &Manifest, switchboard: &Switchboard) -> Option<Finding> {
-    let given = switchboard.header().generations.load(Ordering::Acquire);
+    const MEND: &str =
+        "a broken process has written over it, and the launcher should have mended it: `launch stop`, `launch up`";
+    let header = switchboard.header();
+    if header.lockstep.load(Ordering::Acquire) > 1 {
+        return Some(problem(check, "the page is damaged: it says no kind of time", MEND));
+    }
+    let given = header.generations.load(Ordering::Acquire);
     let is_damaged = |index: u32| {
         switchboard.topic(index).is_some_and(|topic| {
             let publisher = topic.publisher.load(Ordering::Acquire);
@@ -392,11 +398,7 @@ fn page(check: &str, manifest: &Manifest, switchboard: &Switchboard) -> Option<F
         topics.filter(|&(index, _)| is_damaged(index)).map(|(_, topic)| topic.name.as_str()).collect();
     let first = names.first()?;
     let found = format!("the page is damaged for {}, such as `{first}`", show::count(names.len(), "topic"));
-    Some(problem(
-        check,
-        found,
-        "a broken process has written over it, and the launcher should have mended it: `launch stop`, `launch up`",
-    ))
+    Some(problem(check, found, MEND))
 }
 
 fn services(check: &str, manifest: &Manifest, switchboard: &Switchboard) -> Vec<Finding> {

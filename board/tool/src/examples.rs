@@ -4,7 +4,7 @@
 pub(crate) const BOARD: &[&str] = &[
     "board list                                 # what is on the board, who publishes it, how often",
     "board echo safety/clearance                # every message, with names and units",
-    "board echo wheels/odometry --field distance_m --json -n 10",
+    "board echo wheels/odometry --field forward_mps --json -n 10",
     "board rate tof/ranges world/truth          # messages per second and how regular they are",
     "board doctor                               # what is wrong with this machine, and what to do",
 ];
@@ -13,7 +13,7 @@ pub(crate) const LIST: &[&str] =
 pub(crate) const INFO: &[&str] = &["board info safety/clearance", "board info drive.mcap"];
 pub(crate) const ECHO: &[&str] = &[
     "board echo safety/clearance",
-    "board echo location/pose --field pose.x_m",
+    "board echo location/pose --field x_m",
     "board echo tof/ranges --json -n 1 --timeout 5 | jq .message",
 ];
 pub(crate) const RATE: &[&str] = &["board rate", "board rate tof/ranges --interval 5 -n 1 --json"];
