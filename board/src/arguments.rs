@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-/// The longest time that a command line may ask for, in seconds: thirty years, which every clock and sum can hold.
+/// The longest time that a command line may ask for, in seconds: thirty years, which every clock and sum can
+/// hold.
 const LONGEST_S: f64 = 1e9;
 
 /// A number above zero, and not an infinite one.
@@ -58,7 +59,9 @@ mod tests {
         check(positive, "0.5", true);
         check(positive, ".5", true);
         check(positive, "1e300", true);
-        for text in ["nan", "-nan", "inf", "infinity", "-inf", "1e999", "0", "-0", "-1", "", "x", "1s", "0x10"] {
+        for text in
+            ["nan", "-nan", "inf", "infinity", "-inf", "1e999", "0", "-0", "-1", "", "x", "1s", "0x10"]
+        {
             check(positive, text, false);
             check(seconds, text, false);
             check(period, text, false);

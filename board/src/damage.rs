@@ -1,12 +1,14 @@
-//! What the launcher knows of its board besides what stands on the shared page, and how it puts the page right.
+//! What the launcher knows of its board besides what stands on the shared page, and how it puts the page
+//! right.
 //!
-//! Every process of the user may write to the page, and a broken one may write anything. The processes hold on to what
-//! is their own (their place, what wakes them); who may publish, and what kind of time it is, only the launcher knows.
+//! Every process of the user may write to the page, and a broken one may write anything. The processes hold
+//! on to what is their own (their place, what wakes them); who may publish, and what kind of time it is, only
+//! the launcher knows.
 
 use crate::clock;
 use crate::host::{Host, SWITCHBOARD, role_of};
-use crate::private::{Version, identity};
 use crate::manifest::Manifest;
+use crate::private::{Version, identity};
 use crate::switchboard::{SLOTS, Slot};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -61,8 +63,8 @@ impl Known {
         Some(generation)
     }
 
-    /// The place of the living process of this role that has this generation: in a swap the newcomer takes its topics
-    /// by itself.
+    /// The place of the living process of this role that has this generation: in a swap the newcomer takes
+    /// its topics by itself.
     fn place_of(&self, role: &str, generation: u32, living: &[(u32, u32)]) -> Option<u32> {
         let is_it = |place: &u32| {
             let prepared = self.prepared.get(place);
@@ -79,9 +81,9 @@ impl Known {
 }
 
 impl Host {
-    /// Looks for damage of the board, mends what can be mended, and says what it was: a sentence each, none when all is well. What
-    /// cannot be mended is said once. `living` are the launcher's services, newcomers included: place and process. To be called about once a
-    /// second.
+    /// Looks for damage of the board, mends what can be mended, and says what it was: a sentence each, none
+    /// when all is well. What cannot be mended is said once. `living` are the launcher's services, newcomers
+    /// included: place and process. To be called about once a second.
     pub fn repair(&self, living: &[(u32, u32)]) -> Vec<String> {
         let mut found = Vec::new();
         self.repair_header(&mut found);
@@ -123,7 +125,8 @@ impl Host {
             let given = known.speakers.get(role).copied();
             let truth = match known.place_of(role, generation, living) {
                 Some(place) => (place, generation),
-                // A role that the launcher has started nobody for may be played by a process that was started by hand.
+                // A role that the launcher has started nobody for may be played by a process that was started
+                // by hand.
                 None => given.unwrap_or((slot, 0)),
             };
             if (slot, generation) == truth {
@@ -149,7 +152,8 @@ impl Host {
         let now = clock::monotonic();
         let mut names = Vec::new();
         for &(place, pid) in living {
-            let (Some(prepared), Some(slot)) = (known.prepared.get(&place), self.switchboard.slot(place)) else {
+            let (Some(prepared), Some(slot)) = (known.prepared.get(&place), self.switchboard.slot(place))
+            else {
                 continue;
             };
             let mut damaged = slot.restore_claim(&prepared.role);
@@ -185,7 +189,9 @@ impl Host {
             lost.push(format!("{missing} of the board's {all} files in shared memory were deleted"));
         }
         for text in lost {
-            let text = format!("{text}: what runs goes on, and what is started now cannot join; `launch stop` and `launch up` mend it");
+            let text = format!(
+                "{text}: what runs goes on, and what is started now cannot join; `launch stop` and `launch up` mend it"
+            );
             if self.known().said.insert(text.clone()) {
                 found.push(text);
             }

@@ -24,9 +24,13 @@ pub use crate::sweep::{Swept, boards_up, clean_dead, clear, half_made, living_la
 
 pub(crate) const SWITCHBOARD: &str = "switchboard";
 const HEALTH: &str = "health/";
-/// Readers of a topic beyond those of the graph: tools, recorders, newcomers of a swap, ports of the dead that were not cleaned up yet. Each
-/// publisher has memory for all that they may hold, so topics of large messages take fewer: so many bytes, so many readers.
-const SPARE_READERS: [(usize, usize); 3] = [(4 * 1024, 12), (64 * 1024, 6), (usize::MAX, 3)];
+/// Readers of a topic beyond those of the graph: tools, recorders, newcomers of a swap, ports of the dead
+/// that were not cleaned up yet. Each publisher has memory for all that they may hold, so topics of large
+/// messages take fewer: so many bytes, so many readers.
+const SPARE_READERS: [(usize, usize); 3] =
+    [(4 * 1024, 12), (64 * 1024, SPARE_READERS_OF_ELEMENTS), (usize::MAX, 3)];
+/// The same for messages with elements, at the most: nobody knows how many there will be.
+const SPARE_READERS_OF_ELEMENTS: usize = 6;
 
 /// Why a board cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -199,8 +203,9 @@ impl Host {
         &self.manifest
     }
 
-    /// Whether the board still lies where it was made: somebody, or a service manager at a logout, may have deleted its folder. Then nobody
-    /// reaches it any more, and the robot should stop. Costs one look at a file.
+    /// Whether the board still lies where it was made: somebody, or a service manager at a logout, may have
+    /// deleted its folder. Then nobody reaches it any more, and the robot should stop. Costs one look at a
+    /// file.
     pub fn is_in_place(&self) -> bool {
         self.lock.as_ref().is_some_and(Lock::is_in_place)
     }
@@ -276,7 +281,8 @@ impl Host {
         if lock.is_in_place() {
             return self.place.remove();
         }
-        // The folder was deleted. If another stands there now, it is not ours to remove, nor is anything of a board that somebody holds.
+        // The folder was deleted. If another stands there now, it is not ours to remove, nor is anything of a
+        // board that somebody holds.
         let others = lock::holders()?;
         let is_anothers =
             others.iter().any(|(place, pid)| *place == self.place && *pid != std::process::id());
@@ -296,12 +302,14 @@ pub(crate) fn shape_of(topic: &Topic) -> TopicShape {
     TopicShape {
         fingerprint: topic.message.fingerprint(),
         depth: topic.depth,
-        readers: topic.readers.len() + spare_readers(topic.room_bytes()),
+        readers: topic.readers.len() + spare_readers(topic),
     }
 }
 
-fn spare_readers(bytes: usize) -> usize {
-    SPARE_READERS.iter().find(|(most, _)| bytes <= *most).map_or(0, |&(_, readers)| readers)
+fn spare_readers(topic: &Topic) -> usize {
+    let bytes = topic.room_bytes();
+    let readers = SPARE_READERS.iter().find(|(most, _)| bytes <= *most).map_or(0, |&(_, readers)| readers);
+    if topic.message.element.is_some() { readers.min(SPARE_READERS_OF_ELEMENTS) } else { readers }
 }
 
 /// The role whose process publishes a topic; `None` when messages come from outside.
@@ -312,10 +320,11 @@ pub(crate) fn role_of(topic: &Topic) -> Option<&str> {
 /// The transport opens files that the children of this process would inherit.
 fn close_on_exec() {
     for entry in std::fs::read_dir("/proc/self/fd").into_iter().flatten().flatten() {
-        let is_boards = std::fs::read_link(entry.path()).is_ok_and(|target| target.starts_with(SHARED_MEMORY));
+        let is_boards =
+            std::fs::read_link(entry.path()).is_ok_and(|target| target.starts_with(SHARED_MEMORY));
         if is_boards && let Some(number) = entry.file_name().to_str().and_then(|name| name.parse().ok()) {
-            // SAFETY: another thread may have closed it since it was listed, and then the call fails, or does the same for whatever was
-            // opened instead, which no child is meant to inherit either.
+            // SAFETY: another thread may have closed it since it was listed, and then the call fails, or does
+            // the same for whatever was opened instead, which no child is meant to inherit either.
             let _ = fcntl_setfd(unsafe { BorrowedFd::borrow_raw(number) }, FdFlags::CLOEXEC);
         }
     }

@@ -3,7 +3,6 @@
 //! A mapped file with two halves: the state is written into the one that is not in use, then the halves change places. A process that dies in
 //! between leaves the state before. Nothing is asked of the kernel, so a service can save in every step.
 
-use crate::lack::Lack;
 use crate::private;
 use crate::shared::Shared;
 use messages::Time;
@@ -61,7 +60,15 @@ impl Home {
 
 impl<S: Serialize + DeserializeOwned> Kept<S> {
     pub(crate) fn new(home: Option<Home>) -> Self {
-        Self { home, page: None, last: Vec::new(), next: Vec::new(), due: None, complained: false, marker: PhantomData }
+        Self {
+            home,
+            page: None,
+            last: Vec::new(),
+            next: Vec::new(),
+            due: None,
+            complained: false,
+            marker: PhantomData,
+        }
     }
 
     /// What the predecessor saved; `None` on the first start, and when it was of another version.
@@ -93,12 +100,12 @@ impl<S: Serialize + DeserializeOwned> Kept<S> {
         }
     }
 
-    /// What was kept last stays, and the next state is tried again; it is said once, until a state can be kept again.
+    /// What was kept last stays, and the next state is tried again; it is said once, until a state can be
+    /// kept again.
     #[cold]
     fn complain(&mut self, error: &io::Error) {
         if !std::mem::replace(&mut self.complained, true) {
-            let lack = Lack::look().map(|lack| format!(" ({lack})")).unwrap_or_default();
-            tracing::warn!("the state cannot be kept, and a successor would begin with an older one: {error}{lack}");
+            tracing::warn!(%error, "the state cannot be kept, and a successor would begin with an older one");
         }
     }
 

@@ -1,7 +1,7 @@
 //! What has run out when the transport fails: named, with its numbers and the remedy.
 //!
-//! The transport reports an exhausted resource by what failed because of it (`InternalFailure`). So on a failure the
-//! limits of the process and the state of shared memory are looked at.
+//! The transport reports an exhausted resource by what failed because of it (`InternalFailure`). So on a
+//! failure the limits of the process and the state of shared memory are looked at.
 
 use crate::segments;
 use crate::terminal::bytes;
@@ -11,8 +11,8 @@ use std::{fmt, fs, io};
 
 /// A process that has fewer descriptors left than this has run out of them: a port takes a handful.
 const FILES_SPARE: u64 = 8;
-/// Shared memory with less left than this is full: the smallest thing that the transport makes is a page, and it makes
-/// a few at once.
+/// Shared memory with less left than this is full: the smallest thing that the transport makes is a page, and
+/// it makes a few at once.
 const BYTES_SPARE: u64 = 64 * 1024;
 /// A process that can map less than this further has run out of address space.
 const ADDRESS_SPACE_SPARE: u64 = 16 * 1024 * 1024;
@@ -121,7 +121,8 @@ pub(crate) fn free_bytes(found: &StatVfs) -> u64 {
     found.f_bavail * found.f_frsize
 }
 
-/// A size of shared memory in which there is room for so much more, in whole MiB, as `mount` and `docker` take it.
+/// A size of shared memory in which there is room for so much more, in whole MiB, as `mount` and `docker`
+/// take it.
 pub(crate) fn enough_mib(size: u64, free: u64, needed: u64) -> u64 {
     (size.saturating_sub(free) + needed).div_ceil(1024 * 1024).next_power_of_two().max(16)
 }
@@ -130,7 +131,10 @@ impl fmt::Display for Lack {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Files { limit } => {
-                write!(f, "this process may open {limit} files, which are too few; `ulimit -n 1024` allows more")
+                write!(
+                    f,
+                    "this process may open {limit} files, which are too few; `ulimit -n 1024` allows more"
+                )
             }
             Self::FilesOfMachine => write!(
                 f,
@@ -182,6 +186,9 @@ mod tests {
         assert_eq!(enough_mib(64 * MIB, 0, 5 * MIB), 128);
         assert_eq!(enough_mib(64 * MIB, MIB, 400 * MIB), 512);
         let lack = Lack::Memory { needed: 5 * MIB, free: 0, size: 64 * MIB }.to_string();
-        assert!(lack.contains("5.00 MiB of shared memory are needed") && lack.contains("size=128M"), "{lack}");
+        assert!(
+            lack.contains("5.00 MiB of shared memory are needed") && lack.contains("size=128M"),
+            "{lack}"
+        );
     }
 }

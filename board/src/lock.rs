@@ -1,12 +1,12 @@
 //! How it is known that a launcher lives: it has its board's lock file open for writing, and locked.
 //!
-//! The kernel lets go of both however the process ends. That the lock is free, or missing, is not enough to call a
-//! launcher gone: files in shared memory can be deleted under a running robot (systemd does it to a user who logs out,
-//! `RemoveIPC` in logind.conf(5)), and whoever then clears the board away or starts a second one has two robots on the
-//! same wheels. So the processes are looked through for one that still has the file open. Whatever keeps us from
-//! looking is an error, and never means that a launcher is gone.
+//! The kernel lets go of both however the process ends. That the lock is free, or missing, is not enough to
+//! call a launcher gone: files in shared memory can be deleted under a running robot (systemd does it to a
+//! user who logs out,
+//! `RemoveIPC` in logind.conf(5)), and whoever then clears the board away or starts a second one has two
+//! robots on the same wheels. So the processes are looked through for one that still has the file open.
+//! Whatever keeps us from looking is an error, and never means that a launcher is gone.
 
-use crate::lack::Lack;
 use crate::place::{self, Place};
 use crate::private::{self, Identity, identity};
 use rustix::fs::{FlockOperation, OFlags, flock};
@@ -42,15 +42,14 @@ impl Lock {
     }
 }
 
-/// The process of the launcher that holds this board; `None` when there surely is none. Zero for a launcher that lives
-/// where its number cannot be known.
+/// The process of the launcher that holds this board; `None` when there surely is none. Zero for a launcher
+/// that lives where its number cannot be known.
 pub(crate) fn holder(place: &Place) -> io::Result<Option<u32>> {
     let path = place.file(LOCK);
     let doubt = |error: io::Error| {
-        let lack = Lack::of_files(0).map(|lack| format!("; {lack}")).unwrap_or_default();
         let name = place.name();
         let text =
-            format!("whether the launcher of `{name}` lives cannot be told, so nothing was touched: {error}{lack}");
+            format!("whether the launcher of `{name}` lives cannot be told, so nothing was touched: {error}");
         io::Error::new(error.kind(), text)
     };
     match open(&path) {
@@ -71,7 +70,8 @@ pub(crate) fn holder(place: &Place) -> io::Result<Option<u32>> {
     Ok(holders.into_iter().find(|(held, _)| held == place).map(|(_, pid)| pid))
 }
 
-/// The boards of this user whose launchers live, with their processes, whether or not the boards' folders still exist.
+/// The boards of this user whose launchers live, with their processes, whether or not the boards' folders
+/// still exist.
 pub(crate) fn holders() -> io::Result<Vec<(Place, u32)>> {
     let mut found = Vec::new();
     for entry in read_folder(Path::new("/proc"))?.into_iter().flatten() {
@@ -128,9 +128,7 @@ fn is_of_process<T>(read: io::Result<T>) -> io::Result<Option<T>> {
     match read {
         Ok(read) => Ok(Some(read)),
         Err(error) if error.raw_os_error() == Some(libc::ESRCH) => Ok(None),
-        Err(error)
-            if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied) =>
-        {
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied) => {
             Ok(None)
         }
         Err(error) => Err(error),

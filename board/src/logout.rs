@@ -1,8 +1,8 @@
 //! Whether a user's shared memory outlives the user's login.
 //!
-//! systemd removes what a user has in shared memory when the user's last session ends (`RemoveIPC=`, logind.conf(5),
-//! on unless a distribution turns it off): a robot that was started over ssh and detached loses its board at the
-//! logout. Root and system users are spared, and users who linger.
+//! systemd removes what a user has in shared memory when the user's last session ends (`RemoveIPC=`,
+//! logind.conf(5), on unless a distribution turns it off): a robot that was started over ssh and detached
+//! loses its board at the logout. Root and system users are spared, and users who linger.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,11 +10,13 @@ use std::path::{Path, PathBuf};
 /// Users with smaller numbers are the system's, whose shared memory stays.
 const FIRST_USER: u32 = 1000;
 
-/// Why what this user has in shared memory will be removed at logout, and what to do about it; `None` when it stays.
+/// Why what this user has in shared memory will be removed at logout, and what to do about it; `None` when it
+/// stays.
 pub fn removes_shared_memory() -> Option<String> {
     let user = rustix::process::getuid().as_raw();
     let runs_systemd = Path::new("/run/systemd/system").exists();
-    let lingers = user_name(user).is_some_and(|name| Path::new("/var/lib/systemd/linger").join(name).exists());
+    let lingers =
+        user_name(user).is_some_and(|name| Path::new("/var/lib/systemd/linger").join(name).exists());
     if user < FIRST_USER || !runs_systemd || lingers || !removes_ipc(&settings()) {
         return None;
     }
@@ -34,8 +36,8 @@ fn user_name(user: u32) -> Option<String> {
     })
 }
 
-/// The texts of logind's settings, the weakest first: the main file, then the drop-ins in the order of their names, of
-/// which those in /etc hide the others.
+/// The texts of logind's settings, the weakest first: the main file, then the drop-ins in the order of their
+/// names, of which those in /etc hide the others.
 fn settings() -> Vec<String> {
     let mut drop_ins: Vec<PathBuf> = Vec::new();
     for folder in ["/etc/systemd", "/run/systemd", "/usr/local/lib/systemd", "/usr/lib/systemd"] {
@@ -56,7 +58,8 @@ fn settings() -> Vec<String> {
 /// Whether these settings, the weakest first, have shared memory removed.
 fn removes_ipc(settings: &[String]) -> bool {
     let lines = settings.iter().flat_map(|text| text.lines());
-    let values = lines.filter_map(|line| line.trim().strip_prefix("RemoveIPC")?.trim_start().strip_prefix('='));
+    let values =
+        lines.filter_map(|line| line.trim().strip_prefix("RemoveIPC")?.trim_start().strip_prefix('='));
     let last = values.last().map(|value| value.trim().to_ascii_lowercase());
     // systemd's own default, which also an empty value means.
     last.is_none_or(|value| matches!(value.as_str(), "" | "yes" | "y" | "true" | "t" | "on" | "1"))

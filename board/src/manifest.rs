@@ -23,8 +23,8 @@ pub struct Topic {
     pub readers: Vec<String>,
     /// How many messages may wait for a reader.
     pub depth: usize,
-    /// For messages with elements: for how many there is room from the start. Longer ones get room when they come, if
-    /// there is memory.
+    /// For messages with elements: for how many there is room from the start. Longer ones get room when they
+    /// come, if there is memory.
     #[serde(default = "default_elements")]
     pub elements: usize,
     /// The type of its messages.

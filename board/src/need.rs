@@ -1,7 +1,7 @@
 //! How much shared memory a board and its graph take, known before anything of it is made.
 //!
-//! What the transport makes for a topic follows from its shape. The sizes of its own book-keeping are those of iceoryx2
-//! 0.10; a test holds them against what is really there.
+//! What the transport makes for a topic follows from its shape. The sizes of its own book-keeping are those
+//! of iceoryx2 0.10; a test holds them against what is really there.
 
 use crate::host::shape_of;
 use crate::lack::{Lack, SHARED_MEMORY, free_bytes};
@@ -21,7 +21,8 @@ const PROCESS_BYTES: [usize; 2] = [2100, 16];
 const SEGMENT_BYTES: (usize, usize) = (206, 4);
 /// A connection of a publisher and a reader, besides its queues.
 const CONNECTION_BYTES: usize = 280;
-/// A publisher whose memory may grow can have so many segments, and each connection a list for each of them: at all, and for each message.
+/// A publisher whose memory may grow can have so many segments, and each connection a list for each of them:
+/// at all, and for each message.
 const SEGMENTS: usize = 255;
 const SEGMENT_LIST_BYTES: (usize, usize) = (39, 1);
 
@@ -100,7 +101,8 @@ mod tests {
 
     fn taken_by(place: &Place) -> u64 {
         let segments = place.shared_memory();
-        let segments = segments.iter().map(|file| std::fs::metadata(file).map_or(0, |found| found.blocks() * 512));
+        let segments =
+            segments.iter().map(|file| std::fs::metadata(file).map_or(0, |found| found.blocks() * 512));
         segments.sum::<u64>() + taken(place.root())
     }
 
@@ -124,7 +126,9 @@ mod tests {
         for index in 0..readers {
             let listener = join(&format!("listener-{index}"));
             for topic in manifest.topics.iter().filter(|topic| index < topic.readers.len()) {
-                links.push(listener.open_reader(&topic.name, topic.message.fingerprint(), topic.depth).unwrap());
+                links.push(
+                    listener.open_reader(&topic.name, topic.message.fingerprint(), topic.depth).unwrap(),
+                );
             }
             listeners.push(listener);
         }

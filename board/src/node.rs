@@ -168,7 +168,8 @@ impl Joined {
         Ok(link)
     }
 
-    /// The others of a topic come later, and whom a process then cannot open a file for hears nothing of it: so it is refused now.
+    /// The others of a topic come later, and whom a process then cannot open a file for hears nothing of it:
+    /// so it is refused now.
     fn expect_files(&self, topic: &str, more: u64) -> Result<(), TransportError> {
         self.expected_files.set(self.expected_files.get() + more);
         match Lack::of_files(self.expected_files.get()) {
@@ -302,8 +303,8 @@ impl Node {
         self.publisher_of(topic, false, ELEMENTS)
     }
 
-    /// As `publisher`, for messages of up to so many elements. Their memory is reserved before the robot starts; that of longer ones is asked
-    /// for when they come, and may not be there.
+    /// As `publisher`, for messages of up to so many elements. Their memory is reserved before the robot
+    /// starts; that of longer ones is asked for when they come, and may not be there.
     ///
     /// # Errors
     /// As `publisher`.

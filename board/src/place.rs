@@ -159,8 +159,8 @@ pub fn places() -> Vec<Place> {
     places
 }
 
-/// Shared memory of this user's boards that belongs to no folder and no living launcher: somebody removed the folder by
-/// hand. Ask for it under [`Turn`] only, or it may belong to a board that is being taken down.
+/// Shared memory of this user's boards that belongs to no folder and no living launcher: somebody removed the
+/// folder by hand. Ask for it under [`Turn`] only, or it may belong to a board that is being taken down.
 ///
 /// # Errors
 /// When it cannot be told whether a launcher lives.

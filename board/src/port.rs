@@ -95,7 +95,8 @@ impl ReaderLink {
         }
     }
 
-    /// The next message that waits, seen or not by this step's clock. One that is not what it says is counted and left out.
+    /// The next message that waits, seen or not by this step's clock. One that is not what it says is counted
+    /// and left out.
     #[inline(always)]
     pub(crate) fn receive(&mut self) -> Option<RawMessage> {
         loop {
@@ -106,8 +107,8 @@ impl ReaderLink {
         }
     }
 
-    /// Whether the launcher has given the generation that was heard last. One that it has not given yet is forged, and would mute the
-    /// topic's true publisher for ever.
+    /// Whether the launcher has given the generation that was heard last. One that it has not given yet is
+    /// forged, and would mute the topic's true publisher for ever.
     #[cold]
     fn has_heard_true(&self) -> bool {
         self.generation <= self.shared.switchboard.header().generations.load(Ordering::Acquire)
@@ -381,7 +382,8 @@ impl<T: Message> Publisher<T> {
 
     /// Memory for a message with so many elements, to be filled in place and sent. What is not written holds old bytes.
     ///
-    /// `None` when the transport has no memory left, which counts as a lost message, and is reported once a second at most.
+    /// `None` when the transport has no memory left, which counts as a lost message, and is reported once a
+    /// second at most.
     pub fn loan(&mut self, elements: usize) -> Option<Loan<'_, T>> {
         let bytes = if T::HAS_ELEMENTS {
             elements_offset(size_of::<T>()) + elements * size_of::<T::Element>()

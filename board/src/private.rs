@@ -1,5 +1,6 @@
 //! Files that belong to their owner alone, whatever the umask says and whoever was there first.
 
+use crate::lack::Lack;
 use std::fs::{DirBuilder, File, OpenOptions, Permissions};
 use std::io::{self, Write as _};
 use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _, OpenOptionsExt as _, PermissionsExt as _};
@@ -84,10 +85,13 @@ pub(crate) fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
-/// An error with the path it is about.
+/// An error with the path it is about, and with what has run out if that is why.
 pub(crate) fn at(path: &Path) -> impl FnOnce(io::Error) -> io::Error {
     let path = path.display().to_string();
-    move |error| io::Error::new(error.kind(), format!("{path}: {error}"))
+    move |error| {
+        let lack = Lack::behind(&error).map(|lack| format!(" ({lack})")).unwrap_or_default();
+        io::Error::new(error.kind(), format!("{path}: {error}{lack}"))
+    }
 }
 
 #[cfg(test)]

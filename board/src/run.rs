@@ -79,8 +79,8 @@ fn run_with(
     }
 }
 
-/// Whether an error is the board's and not the set-up's, so that another start may help: a page that was written over is mended by the
-/// launcher.
+/// Whether an error is the board's and not the set-up's, so that another start may help: a page that was
+/// written over is mended by the launcher.
 fn passes_by(error: &(dyn Error + Send + Sync + 'static)) -> bool {
     matches!(
         error.downcast_ref(),
@@ -93,8 +93,8 @@ fn say(text: &str) {
     let _ = io::stdout().write_all(text.as_bytes()).and_then(|()| io::stdout().flush());
 }
 
-/// The standard error. A log that cannot be written is no reason to die, and what a service logs may come from a message: a terminal is not to
-/// obey it.
+/// The standard error. A log that cannot be written is no reason to die, and what a service logs may come
+/// from a message: a terminal is not to obey it.
 struct Log;
 
 impl io::Write for Log {
@@ -359,8 +359,8 @@ impl Service {
         shared.held.borrow_mut().clear();
     }
 
-    /// Writes again what is this process's own on the board's page, should a broken process have written over it: its place, and what wakes
-    /// it.
+    /// Writes again what is this process's own on the board's page, should a broken process have written over
+    /// it: its place, and what wakes it.
     fn hold_place(&self, slot: &Slot) {
         slot.hold();
         for &(topic, _) in &self.wakes {
@@ -446,7 +446,8 @@ impl Service {
         }
     }
 
-    /// A reader or a publisher came that this process could not connect to: one of the two hears nothing of the other.
+    /// A reader or a publisher came that this process could not connect to: one of the two hears nothing of
+    /// the other.
     fn say_unconnected(&mut self) {
         let unconnected = transport::unconnected();
         if unconnected != self.unconnected {

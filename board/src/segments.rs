@@ -1,12 +1,13 @@
-//! What the transport cannot be told about its segments of shared memory: that they are really there before anybody
-//! writes into them, and that they belong to their owner alone.
+//! What the transport cannot be told about its segments of shared memory: that they are really there before
+//! anybody writes into them, and that they belong to their owner alone.
 //!
-//! iceoryx2 0.10 sizes a segment with `ftruncate`, which promises memory that need not exist: with shared memory full,
-//! whoever first writes to a page of it is ended by SIGBUS, in the middle of a drive. And it makes the one that holds a
-//! board's processes together readable and writable by everybody, so that any user can end the robot with a few random
-//! bytes. It has no setting for either. So this crate provides the `ftruncate` and the `fchmod` that it calls: for a
-//! segment of a board the one allocates as well, and a lack is an error of the call; the other leaves the owner's bits
-//! alone. For every other file both are the system call and nothing else.
+//! iceoryx2 0.10 sizes a segment with `ftruncate`, which promises memory that need not exist: with shared
+//! memory full, whoever first writes to a page of it is ended by SIGBUS, in the middle of a drive. And it
+//! makes the one that holds a board's processes together readable and writable by everybody, so that any user
+//! can end the robot with a few random bytes. It has no setting for either. So this crate provides the
+//! `ftruncate` and the `fchmod` that it calls: for a segment of a board the one allocates as well, and a lack
+//! is an error of the call; the other leaves the owner's bits alone. For every other file both are the system
+//! call and nothing else.
 
 use crate::place;
 use std::cell::Cell;
@@ -24,7 +25,8 @@ thread_local! {
     static LAST: Cell<u64> = const { Cell::new(0) };
 }
 
-/// How much was asked for in this thread and could not be had since the last call, in bytes; zero for nothing.
+/// How much was asked for in this thread and could not be had since the last call, in bytes; zero for
+/// nothing.
 pub(crate) fn take_refused() -> u64 {
     REFUSED.take()
 }

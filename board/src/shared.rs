@@ -70,7 +70,8 @@ impl Shared {
         self.invalid.set(self.invalid.get().saturating_add(1));
     }
 
-    /// A message could not be sent: it is counted, and said at most once a second, since the next one will fare no better.
+    /// A message could not be sent: it is counted, and said at most once a second, since the next one will
+    /// fare no better.
     #[cold]
     pub(crate) fn lose(&self, topic: &str, error: &TransportError) {
         self.lost.set(self.lost.get().saturating_add(1));

@@ -14,9 +14,8 @@ use std::time::Duration;
 
 /// The process of the launcher that holds this board; `None` when there surely is none.
 ///
-/// # Errors
-/// When that cannot be told, for instance because this process may open no more files. It never means that the launcher
-/// is gone.
+/// # Errors When that cannot be told, for instance because this process may open no more files. It never
+///   means that the launcher is gone.
 pub fn living_launcher(place: &Place) -> io::Result<Option<u32>> {
     match place.check() {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
@@ -52,8 +51,8 @@ pub struct Swept {
 
 /// Clears away every board of this user whose launcher is gone, and says what it was.
 ///
-/// # Errors
-/// When something cannot be removed, or it cannot be told whether a launcher lives: then its board stays as it is.
+/// # Errors When something cannot be removed, or it cannot be told whether a launcher lives: then its board
+///   stays as it is.
 pub fn sweep() -> io::Result<Vec<Swept>> {
     let _turn = Turn::take()?;
     let mut swept = Vec::new();
@@ -70,7 +69,8 @@ pub fn sweep() -> io::Result<Vec<Swept>> {
     Ok(swept)
 }
 
-/// Clears away as [`sweep`] does, but the board of this name alone where one is named: who says which board is meant does not touch others.
+/// Clears away as [`sweep`] does, but the board of this name alone where one is named: who says which board
+/// is meant does not touch others.
 ///
 /// # Errors
 /// When something cannot be removed, or the name is none.
@@ -108,7 +108,8 @@ pub(crate) fn clear_away(place: &Place) -> io::Result<Option<Swept>> {
     Ok(Some(Swept { board: place.name().to_owned(), ended, files }))
 }
 
-/// Ends the services of a board whose launcher is gone: politely first, since the base driver stops the wheels on its way out.
+/// Ends the services of a board whose launcher is gone: politely first, since the base driver stops the
+/// wheels on its way out.
 fn end_services(place: &Place) -> Vec<(String, u32)> {
     let Ok(switchboard) = Switchboard::open(&place.file(SWITCHBOARD)) else { return Vec::new() };
     let living = || -> Vec<(String, u32)> {
@@ -140,8 +141,8 @@ fn end_services(place: &Place) -> Vec<(String, u32)> {
     ended
 }
 
-/// Whether this process lives and has the board's page mapped: process numbers are used again, and a page that was written by a broken process
-/// must not make us end a stranger.
+/// Whether this process lives and has the board's page mapped: process numbers are used again, and a page
+/// that was written by a broken process must not make us end a stranger.
 fn is_of_board(pid: u32, place: &Place) -> bool {
     let page = place.file(SWITCHBOARD);
     pid != 0
@@ -159,8 +160,9 @@ fn count_files(folder: &Path) -> usize {
         .sum()
 }
 
-/// Cleans up after processes of this board that died: their ports, their memory, and what they had half made. It can hang when a
-/// process died at a bad moment, so the launcher runs it in a helper process with a time limit.
+/// Cleans up after processes of this board that died: their ports, their memory, and what they had half made.
+/// It can hang when a process died at a bad moment, so the launcher runs it in a helper process with a time
+/// limit.
 ///
 /// # Errors
 /// When the board cannot be joined.
@@ -168,7 +170,8 @@ pub fn clean_dead(name: &str) -> Result<usize, HostError> {
     let place = Place::new(name)?;
     // Joining would make the transport's part of a board that is not there.
     place.check()?;
-    // Those who died while they made a file leave it half made, and the transport, here and in the services, waits for its end.
+    // Those who died while they made a file leave it half made, and the transport, here and in the services,
+    // waits for its end.
     let failed = janitor::beside(&place, || Member::join(&place).map(|member| member.clean()))?;
     if let Ok(switchboard) = Switchboard::open(&place.file(SWITCHBOARD)) {
         let dead: Vec<u32> = switchboard.dead_tools().map(|(index, _)| index).collect();

@@ -21,7 +21,8 @@ pub const SLOTS: usize = 128;
 /// Topics on one board at the most.
 pub const TOPICS: usize = 256;
 const MAGIC: u64 = 0x6b72_6f63_0000_0007;
-/// How far a moment on the page may lie ahead of the clock of who reads it, which was looked at a little before.
+/// How far a moment on the page may lie ahead of the clock of who reads it, which was looked at a little
+/// before.
 const AHEAD: Duration = Duration::from_millis(100);
 const ROLE_BYTES: usize = 48;
 /// Stands for no slot.
@@ -183,7 +184,8 @@ impl Switchboard {
     /// # Errors
     /// When there is none, or it was made by another version.
     pub fn open(path: &Path) -> io::Result<Self> {
-        let unfit = |why: &str| io::Error::new(io::ErrorKind::InvalidData, format!("{}: {why}", path.display()));
+        let unfit =
+            |why: &str| io::Error::new(io::ErrorKind::InvalidData, format!("{}: {why}", path.display()));
         let file = private::open(path)?;
         if file.metadata().map_err(private::at(path))?.len() != PAGE_BYTES as u64 {
             return Err(unfit("the board was made by another version of Corkboard"));
@@ -260,8 +262,8 @@ impl Switchboard {
         })
     }
 
-    /// Gives back a slot that this process has claimed. One that another living process has claimed since, because the page said that it was
-    /// free, stays as it is.
+    /// Gives back a slot that this process has claimed. One that another living process has claimed since,
+    /// because the page said that it was free, stays as it is.
     pub fn release(&self, index: u32) {
         let is_ours = |slot: &&Slot| slot.owner() == std::process::id() || !slot.is_held();
         if let Some(slot) = self.slot(index).filter(is_ours) {
@@ -375,7 +377,8 @@ impl Slot {
         owner != 0 && process_lives(owner)
     }
 
-    /// Writes again that this process has claimed the slot for a service of this role; whether anything else stood there.
+    /// Writes again that this process has claimed the slot for a service of this role; whether anything else
+    /// stood there.
     pub(crate) fn restore_claim(&self, role: &str) -> bool {
         let mut differs = self.owner.swap(std::process::id(), Ordering::AcqRel) != std::process::id();
         differs |= self.is_service.swap(1, Ordering::AcqRel) != 1;
@@ -386,8 +389,8 @@ impl Slot {
         differs
     }
 
-    /// Keeps a place that is this process's own: what a broken process has written into it could make others take it for
-    /// dead, or give the place away.
+    /// Keeps a place that is this process's own: what a broken process has written into it could make others
+    /// take it for dead, or give the place away.
     pub(crate) fn hold(&self) {
         let pid = std::process::id();
         if self.pid.load(Ordering::Relaxed) != pid {
@@ -441,8 +444,8 @@ impl Slot {
         wait(&self.bell, &self.sleeps, heard, timeout);
     }
 
-    /// How long ago the process last looked about. `None` when nothing can be said: it has not yet, or the page says nonsense, which a
-    /// living process writes over at its next look.
+    /// How long ago the process last looked about. `None` when nothing can be said: it has not yet, or the
+    /// page says nonsense, which a living process writes over at its next look.
     pub fn silence(&self, now: Time) -> Option<Duration> {
         since(&self.heartbeat_ns, now)
     }
@@ -452,7 +455,8 @@ impl Slot {
         since(&self.step_since_ns, now)
     }
 
-    /// Lets the silence of a running process count from now where nothing can be said of it; whether the page said nonsense.
+    /// Lets the silence of a running process count from now where nothing can be said of it; whether the page
+    /// said nonsense.
     pub(crate) fn restore_heartbeat(&self, now: Time, lockstep: bool) -> bool {
         // In lockstep nobody looks about between its turns.
         if lockstep || self.state() != SlotState::Running || self.silence(now).is_some() {

@@ -53,8 +53,8 @@ impl Tap {
         Ok(Self { joined, topology: Cell::new(0), wakes: RefCell::default(), manifest_file })
     }
 
-    /// Reads the table of contents again if it has changed; the places in it of the topics that are new. Those that were there stay where they
-    /// were. Costs one look at a file while nothing changes.
+    /// Reads the table of contents again if it has changed; the places in it of the topics that are new.
+    /// Those that were there stay where they were. Costs one look at a file while nothing changes.
     ///
     /// # Errors
     /// When it cannot be read.

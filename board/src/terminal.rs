@@ -1,10 +1,11 @@
 //! Text on its way to a terminal.
 //!
-//! What a message, a log or a name says is somebody else's: an escape sequence in it could retitle the window, repaint
-//! the screen, or answer a question in the operator's name.
+//! What a message, a log or a name says is somebody else's: an escape sequence in it could retitle the
+//! window, repaint the screen, or answer a question in the operator's name.
 
-/// The text with everything that a terminal would obey written out, such as `\u{1b}` for an escape: control characters
-/// of both sets, line ends among them, and the marks that turn the direction of writing. A tab stays.
+/// The text with everything that a terminal would obey written out, such as `\u{1b}` for an escape: control
+/// characters of both sets, line ends among them, and the marks that turn the direction of writing. A tab
+/// stays.
 pub fn harmless(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for letter in text.chars() {
@@ -40,7 +41,8 @@ pub fn three_digits(number: f64) -> String {
 fn is_obeyed(letter: char) -> bool {
     match letter {
         '\t' => false,
-        // Line and paragraph separators end a line on some terminals; the others turn the direction of what follows.
+        // Line and paragraph separators end a line on some terminals; the others turn the direction of what
+        // follows.
         '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => true,
         _ => letter.is_control(),
     }

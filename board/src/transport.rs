@@ -4,16 +4,17 @@ use crate::lack::Lack;
 use crate::place::Place;
 use crate::segments;
 use iceoryx2::config::Config;
-use iceoryx2::port::{DegradationAction, DegradationCause, DegradationInfo};
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::port::update_connections::UpdateConnections as _;
+use iceoryx2::port::{DegradationAction, DegradationCause, DegradationInfo};
 use iceoryx2::prelude::*;
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use std::cell::Cell;
 use std::fmt;
 use std::os::unix::fs::MetadataExt as _;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -50,8 +51,8 @@ struct Header {
 /// Alignment of every message in shared memory, in bytes.
 const ALIGNMENT: usize = 64;
 
-/// What messages are made of. A slice of single bytes takes 64 times the memory: the transport rounds each element of a
-/// slice up to the slice's alignment (iceoryx2 0.10).
+/// What messages are made of. A slice of single bytes takes 64 times the memory: the transport rounds each
+/// element of a slice up to the slice's alignment (iceoryx2 0.10).
 #[derive(Debug, Clone, Copy, ZeroCopySend, FromBytes, IntoBytes, Immutable, KnownLayout)]
 #[type_name("corkboard/Block/1")]
 #[repr(C)]
@@ -62,14 +63,16 @@ struct Block([u8; ALIGNMENT]);
 /// cleaned up after yet.
 const PUBLISHERS: usize = 8;
 
-/// Messages that a reader may hold at once: the one that is read, the one that takes its place, and one that came early.
+/// Messages that a reader may hold at once: the one that is read, the one that takes its place, and one that
+/// came early.
 pub(crate) const BORROWED: usize = 3;
 /// Messages that a publisher may write at once.
 pub(crate) const LOANED: usize = 2;
 /// Messages that are kept for readers that come late.
 pub(crate) const HISTORY: usize = 1;
 
-/// A failure of the transport: what was being done, what is lacking for it if anything is, and the transport's words.
+/// A failure of the transport: what was being done, what is lacking for it if anything is, and the
+/// transport's words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TransportError {
     doing: String,
@@ -113,7 +116,10 @@ fn in_words(cause: &str) -> Option<String> {
             format!("it has {PUBLISHERS} publishers, which is as many as it takes; {tools}")
         }
         "ExceedsMaxNumberOfNodes" => {
-            format!("{} processes have joined it, which is as many as it takes; {tools}", crate::switchboard::SLOTS)
+            format!(
+                "{} processes have joined it, which is as many as it takes; {tools}",
+                crate::switchboard::SLOTS
+            )
         }
         "IncompatibleTypes" => "the board was made by another version of Corkboard".to_owned(),
         "DoesNotExist" => "its files in shared memory were deleted; `launch stop` and `launch up` make them \
@@ -157,6 +163,9 @@ pub(crate) struct RawTopic {
 
 pub(crate) struct RawPublisher {
     publisher: Publisher<ipc::Service, [Block], Header>,
+    /// Blocks of the longest message that there is room for at present.
+    room: Cell<usize>,
+    grows: bool,
 }
 
 pub(crate) struct RawReader {
@@ -269,7 +278,8 @@ fn fingerprint_attribute(fingerprint: u64) -> Result<(AttributeKey, AttributeVal
     Ok((key, value))
 }
 
-/// Every port of a service opens a few files, and the usual limit of 1024 is low for a service that reads many topics.
+/// Every port of a service opens a few files, and the usual limit of 1024 is low for a service that reads
+/// many topics.
 fn raise_file_limit() {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
     const ENOUGH: u64 = 4096;
@@ -315,7 +325,8 @@ fn retried<T>(mut attempt: impl FnMut() -> Result<T, TransportError>) -> Result<
     attempt()
 }
 
-/// Ports that could not be connected so far: the transport goes on without a word, and one of the two hears nothing.
+/// Ports that could not be connected so far: the transport goes on without a word, and one of the two hears
+/// nothing.
 static UNCONNECTED: AtomicU64 = AtomicU64::new(0);
 
 /// How many ports of this process could not be connected so far.
@@ -341,20 +352,21 @@ fn connected<T>(port: T, before: u64, doing: &str) -> Result<T, TransportError> 
 impl RawTopic {
     pub(crate) fn publisher(&self, room: Room) -> Result<RawPublisher, TransportError> {
         const DOING: &str = "the topic takes no further publisher";
-        let strategy = if room.grows { AllocationStrategy::PowerOfTwo } else { AllocationStrategy::Static };
+        let strategy = if room.grows { AllocationStrategy::BestFit } else { AllocationStrategy::Static };
+        let blocks = blocks(room.bytes);
         retried(|| {
             segments::take_refused();
             let before = unconnected();
             let publisher = self
                 .factory
                 .publisher_builder()
-                .initial_max_slice_len(blocks(room.bytes))
+                .initial_max_slice_len(blocks)
                 .allocation_strategy(strategy)
                 .max_loaned_samples(LOANED)
                 .set_degradation_handler(note_unconnected)
                 .create()
                 .map_err(|error| failed(DOING)(&error))?;
-            connected(RawPublisher { publisher }, before, DOING)
+            connected(RawPublisher { publisher, room: Cell::new(blocks), grows: room.grows }, before, DOING)
         })
     }
 
@@ -388,16 +400,37 @@ fn blocks(bytes: usize) -> usize {
     bytes.div_ceil(ALIGNMENT).max(1)
 }
 
+/// The number, up to an eighth more, so that few such numbers lie between one and the next power of two.
+fn rounded_up(number: usize) -> usize {
+    number.next_multiple_of((1 << number.max(8).ilog2()) >> 3)
+}
+
 impl RawPublisher {
     /// Memory for a message of so many bytes, in which every byte has some value.
     pub(crate) fn loan(&self, bytes: usize) -> Result<RawLoan, TransportError> {
+        let blocks = blocks(bytes);
+        if blocks > self.room.get() && self.grows {
+            self.grow(blocks)?;
+        }
         let sample = self
             .publisher
-            .loan_slice_uninit(blocks(bytes))
-            .map_err(|error| failed("no memory for a message")(&error))?;
-        // SAFETY: the memory is part of a mapped file, so each byte has a value, if an old one; a block takes any. At once, since what is not
-        // yet initialised is four times as large to hand around, which shows at a microsecond a message.
+            .loan_slice_uninit(blocks)
+            .map_err(|error| failed(format!("no memory for a message of {bytes} bytes"))(&error))?;
+        // SAFETY: the memory is part of a mapped file, so each byte has a value, if an old one; a block takes
+        // any. At once, since what is not yet initialised is four times as large to hand around, which shows
+        // at a microsecond a message.
         Ok(RawLoan { sample: unsafe { sample.assume_init() }, length: bytes })
+    }
+
+    /// Makes room for longer messages, and somewhat more: a publisher can grow 255 times. Not twice as much, as the
+    /// transport would, since there is a message for each place of each reader.
+    #[cold]
+    fn grow(&self, blocks: usize) -> Result<(), TransportError> {
+        let room = rounded_up(blocks);
+        let loan = self.publisher.loan_slice_uninit(room);
+        loan.map_err(|error| failed(format!("no room for messages of {} bytes", room * ALIGNMENT))(&error))?;
+        self.room.set(room);
+        Ok(())
     }
 
     /// Serves readers that have joined since, so that they get the last message.
@@ -475,6 +508,16 @@ mod tests {
     }
 
     #[test]
+    fn growth_has_few_steps() {
+        let mut sizes: Vec<usize> = (1..1_000_000).map(rounded_up).collect();
+        assert!(
+            (1..1_000_000).zip(&sizes).all(|(wanted, &size)| size >= wanted && size <= wanted + wanted / 8)
+        );
+        sizes.dedup();
+        assert!(sizes.len() < 200, "{}", sizes.len());
+    }
+
+    #[test]
     fn a_fixed_message_has_no_room_to_grow() {
         let place = Place::new(&format!("t-g-{}", std::process::id())).unwrap();
         place.create().unwrap();
@@ -483,7 +526,9 @@ mod tests {
         let fixed = topic.publisher(Room { bytes: 100, grows: false }).unwrap();
         assert!(fixed.loan(128).is_ok() && fixed.loan(129).is_err());
         let growing = topic.publisher(Room { bytes: 100, grows: true }).unwrap();
-        assert_eq!(growing.loan(100_000).unwrap().bytes().len(), 100_000);
+        for length in [100_000, 50, 100_001, 300_000] {
+            assert_eq!(growing.loan(length).unwrap().bytes().len(), length);
+        }
         drop((fixed, growing, topic, member));
         place.remove().unwrap();
     }

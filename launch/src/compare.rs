@@ -27,7 +27,8 @@ pub(crate) fn digest(file: &Path, as_json: bool) -> Result<(), String> {
     say(&text)
 }
 
-/// `launch diff A B`: exit code 0 when the runs are the same, 1 when they differ, or when one of them was cut.
+/// `launch diff A B`: exit code 0 when the runs are the same, 1 when they differ, or when one of them was
+/// cut.
 pub(crate) fn diff(a: &Path, b: &Path, as_json: bool) -> Result<ExitCode, String> {
     let runs = [open(a)?, open(b)?];
     let cuts = [cut_at(&runs[0])?, cut_at(&runs[1])?];

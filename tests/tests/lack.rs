@@ -1,4 +1,5 @@
-//! A machine that has too little of something: a sentence with what lacks, how much, and the remedy; never a signal.
+//! A machine that has too little of something: a sentence with what lacks, how much, and the remedy; never a
+//! signal.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
 
@@ -6,7 +7,8 @@ use std::process::{Command, Output};
 use std::sync::atomic::{AtomicU32, Ordering};
 use tests::{build, launcher};
 
-/// What the shell says in a place of its own, where shared memory has this size; `None` where that is not permitted.
+/// What the shell says in a place of its own, where shared memory has this size; `None` where that is not
+/// permitted.
 fn with_shared_memory(options: &str, script: &str) -> Option<Output> {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
     let board = format!("t-m-{}-{}", std::process::id(), NUMBER.fetch_add(1, Ordering::Relaxed));
@@ -18,7 +20,9 @@ fn with_shared_memory(options: &str, script: &str) -> Option<Output> {
         .env("BOARD", board)
         .output();
     match output {
-        Ok(output) if output.status.code() != Some(77) && !words(&output).contains("unshare failed") => Some(output),
+        Ok(output) if output.status.code() != Some(77) && !words(&output).contains("unshare failed") => {
+            Some(output)
+        }
         _ => {
             println!("skipped: no file system can be mounted here");
             None

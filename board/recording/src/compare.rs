@@ -78,7 +78,8 @@ impl Recording {
 }
 
 impl Recording {
-    /// How far a recording goes that was cut: the latest stamp in it, zero when it has no message; `None` for one that is complete.
+    /// How far a recording goes that was cut: the latest stamp in it, zero when it has no message; `None` for
+    /// one that is complete.
     ///
     /// # Errors
     /// When the file is damaged.

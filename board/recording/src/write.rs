@@ -112,7 +112,8 @@ impl Recorder {
         })
     }
 
-    /// Records a topic that was not there at the beginning, from now on; its place in the manifest, for [`Recorder::record`].
+    /// Records a topic that was not there at the beginning, from now on; its place in the manifest, for
+    /// [`Recorder::record`].
     ///
     /// # Errors
     /// When the file cannot be written, holds no more topics, or the message type contradicts itself.
@@ -124,7 +125,8 @@ impl Recorder {
         self.codecs.push(codec(&self.path, topic)?);
         self.said.push(None);
         self.manifest.topics.push(topic.clone());
-        // A reader takes the last table of contents that it finds. What was recorded so far is whole before it.
+        // A reader takes the last table of contents that it finds. What was recorded so far is whole before
+        // it.
         self.flush()?;
         let contents = contents(&self.manifest);
         self.write(|writer| {
@@ -153,7 +155,11 @@ impl Recorder {
                 self.said[topic] = Some(context);
                 let record = context.write(channel_id);
                 self.write(|writer| {
-                    writer.write_private_record(CONTEXT, &record, PrivateRecordOptions::IncludeInChunks.into())
+                    writer.write_private_record(
+                        CONTEXT,
+                        &record,
+                        PrivateRecordOptions::IncludeInChunks.into(),
+                    )
                 })?;
             }
             let header = MessageHeader {

@@ -1,4 +1,5 @@
-//! A page that a broken process has written over: nobody crashes, and with the launcher's help everything heals.
+//! A page that a broken process has written over: nobody crashes, and with the launcher's help everything
+//! heals.
 
 use crate::robot::{Robot, await_message, wait_for};
 use crate::services::Count;
@@ -80,7 +81,8 @@ pub(crate) fn a_page_that_was_written_over_heals() {
             // What the counter says from now on passes through the relay again.
             let heard = await_message::<Count>(&tap, &mut relayed, |_, count| count.number > last.get());
             last.set(heard.number);
-            let next = await_message::<Count>(&tap, &mut relayed, |_, count| count.number > heard.number + 10);
+            let next =
+                await_message::<Count>(&tap, &mut relayed, |_, count| count.number > heard.number + 10);
             last.set(next.number);
             wait_for("a page without damage", || robot.host.repair(&living).is_empty());
             Ok(())
@@ -112,11 +114,17 @@ pub(crate) fn damage_is_said() {
     check(&|| std::fs::write(file("board.json"), "{}").unwrap(), "table of contents");
     check(&|| std::fs::remove_file(file("board.json")).unwrap(), "table of contents");
     assert!(board::manifest::Manifest::read(robot.host.place()).unwrap().topic("count").is_some());
-    let segment = robot.host.place().shared_memory().into_iter().find(|file| {
-        file.extension().is_some_and(|extension| extension == "dynamic")
-    });
+    let segment = robot
+        .host
+        .place()
+        .shared_memory()
+        .into_iter()
+        .find(|file| file.extension().is_some_and(|extension| extension == "dynamic"));
     let hidden = segment.unwrap();
-    check(&|| std::fs::rename(&hidden, hidden.with_extension("hidden")).unwrap(), "files in shared memory were deleted");
+    check(
+        &|| std::fs::rename(&hidden, hidden.with_extension("hidden")).unwrap(),
+        "files in shared memory were deleted",
+    );
     robot.take_down();
 }
 

@@ -8,6 +8,7 @@ use std::io::{BufRead as _, BufReader};
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _};
 use std::path::Path;
 use std::process::{Child, ExitCode, Stdio};
+use std::sync::atomic::Ordering;
 
 /// A launcher with two services in a process of its own.
 struct Launcher {
@@ -159,6 +160,63 @@ pub(crate) fn everything_is_its_owners() {
     robot.take_down();
     // SAFETY: as above.
     unsafe { libc::umask(before) };
+}
+
+pub(crate) fn what_cannot_be_said_is_no_panic() {
+    let run = |arguments: &[&str], stdout: Stdio, stderr: Stdio| {
+        let mut command = itself("counter");
+        command.args(arguments).stdin(Stdio::null()).stdout(stdout).stderr(stderr);
+        command.spawn().unwrap()
+    };
+    let full = || Stdio::from(std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap());
+    for arguments in [&["--interface"][..], &["--example"], &["--help"], &["--version"]] {
+        let mut closed = run(arguments, Stdio::piped(), Stdio::piped());
+        drop(closed.stdout.take());
+        let output = closed.wait_with_output().unwrap();
+        let words = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() != Some(101) && words.is_empty(), "{arguments:?}: {words}");
+    }
+    // A board that there is not, with nobody to tell.
+    let code = |stderr: Stdio| run(&["--board", "t-nowhere"], full(), stderr).wait().unwrap().code();
+    assert_eq!([code(full()), code(Stdio::null())], [Some(i32::from(board::EXIT_SETUP)); 2]);
+    // A log that is full ends nobody who lives.
+    let robot = Robot::new(&[("count", "counter")]);
+    let mut service = robot.command("chatty");
+    let mut service = service.stdout(full()).stderr(full()).spawn().unwrap();
+    let steps = || {
+        let taken = robot.host.switchboard().taken().map(|(_, slot)| slot.steps.load(Ordering::Acquire));
+        taken.max().unwrap_or(0)
+    };
+    crate::robot::wait_for("its steps", || steps() > 20);
+    assert!(service.try_wait().unwrap().is_none());
+    service.kill().unwrap();
+    service.wait().unwrap();
+    robot.take_down();
+}
+
+/// Files of a process that lie in shared memory.
+fn open_files(pid: u32) -> usize {
+    let entries = std::fs::read_dir(format!("/proc/{pid}/fd")).unwrap().flatten();
+    let targets = entries.filter_map(|entry| std::fs::read_link(entry.path()).ok());
+    targets.filter(|target| target.starts_with("/dev/shm")).count()
+}
+
+pub(crate) fn nothing_is_inherited() {
+    let mut robot = Robot::new(&[("count", "counter")]);
+    let files = |robot: &mut Robot| {
+        let slot = robot.start("counter");
+        let pid = robot.host.switchboard().slot(slot).unwrap().pid.load(Ordering::Acquire);
+        let files = open_files(pid);
+        robot.end_services();
+        files
+    };
+    let before = files(&mut robot);
+    // What the launcher opens in between is its own. Topics that the service does not know, so that it opens none of it itself.
+    let tap = robot.tap();
+    let readers = ["scan", "ranges", "seen"].map(|topic| tap.reader(topic).unwrap());
+    assert_eq!(files(&mut robot), before);
+    drop((readers, tap));
+    robot.take_down();
 }
 
 /// Tries to make a board, as a user in whose name somebody else has made its files.

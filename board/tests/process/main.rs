@@ -9,6 +9,7 @@ mod bells;
 mod chaos;
 mod damage;
 mod launchers;
+mod memory;
 mod ports;
 mod robot;
 mod runner;
@@ -23,6 +24,7 @@ fn main() -> ExitCode {
         Ok("robbed") => teardown::robbed_process(),
         Ok("tool") => teardown::tool_process(),
         Ok("cleaner") => chaos::cleaner_process(),
+        Ok("cramped") => memory::cramped_process(),
         Ok("blind") => launchers::blind_process(),
         Ok("squatted") => launchers::squatted_process(),
         Ok("bell") => bells::other_process(),
@@ -55,6 +57,9 @@ fn main() -> ExitCode {
             ("everything_is_its_owners", launchers::everything_is_its_owners),
             ("a_strangers_file_is_refused_by_its_name", launchers::a_strangers_file_is_refused_by_its_name),
             ("a_page_that_was_written_over_heals", damage::a_page_that_was_written_over_heals),
+            ("a_message_without_room_is_lost_and_said", memory::a_message_without_room_is_lost_and_said),
+            ("what_cannot_be_said_is_no_panic", launchers::what_cannot_be_said_is_no_panic),
+            ("nothing_is_inherited", launchers::nothing_is_inherited),
             ("damage_is_said", damage::damage_is_said),
             ("nonsense_is_no_silence", damage::nonsense_is_no_silence),
             ("deaths_during_start_up_break_nothing", chaos::deaths_during_start_up_break_nothing),

@@ -53,7 +53,8 @@ pub(crate) fn choose(common: &Common) -> Result<Place, Box<dyn Error>> {
 /// That there is no board of this name, with those that there are.
 pub(crate) fn unknown(name: &str, up: &[Place]) -> ConnectError {
     let names: Vec<&str> = up.iter().map(Place::name).collect();
-    let up = if names.is_empty() { "none is up".to_owned() } else { format!("there is {}", names.join(", ")) };
+    let up =
+        if names.is_empty() { "none is up".to_owned() } else { format!("there is {}", names.join(", ")) };
     ConnectError::Unknown { name: name.to_owned(), up }
 }
 

@@ -365,22 +365,23 @@ fn board(place: &Place, launcher: u32) -> Vec<Finding> {
 
 /// Files that others could read, or worse.
 fn modes(check: &str, place: &Place, files: &[PathBuf]) -> Option<Finding> {
-    let fixed = ["", "board.json", "switchboard", "launcher.lock", "control.sock"].map(|name| place.file(name));
+    let fixed =
+        ["", "board.json", "switchboard", "launcher.lock", "control.sock"].map(|name| place.file(name));
     let is_open = |file: &&PathBuf| {
         let found = std::fs::symlink_metadata(file);
         found.is_ok_and(|found| found.mode() & 0o077 != 0 || found.uid() != getuid().as_raw())
     };
     let open: Vec<&PathBuf> = files.iter().chain(&fixed).filter(is_open).collect();
     let first = open.first()?;
-    let found = format!("{} not its owner's alone, such as {}", show::count(open.len(), "file"), first.display());
+    let found =
+        format!("{} not its owner's alone, such as {}", show::count(open.len(), "file"), first.display());
     let mend = format!("whoever may write there can end the robot: `chmod go= {}`", first.display());
     Some(if files.contains(first) { problem(check, found, mend) } else { warn(check, found, mend) })
 }
 
 /// What cannot stand on a page that only sound processes have written to.
 fn page(check: &str, manifest: &Manifest, switchboard: &Switchboard) -> Option<Finding> {
-    const MEND: &str =
-        "a broken process has written over it, and the launcher should have mended it: `launch stop`, `launch up`";
+    const MEND: &str = "a broken process has written over it, and the launcher should have mended it: `launch stop`, `launch up`";
     let header = switchboard.header();
     if header.lockstep.load(Ordering::Acquire) > 1 {
         return Some(problem(check, "the page is damaged: it says no kind of time", MEND));

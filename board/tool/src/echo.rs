@@ -19,7 +19,8 @@ pub(crate) struct Options {
     /// Print this field only: `pose.x_m`, `elements.3`.
     #[arg(long, value_name = "PATH")]
     field: Option<String>,
-    /// End after so many seconds without a message, with exit code 3 when none came at all, or fewer than -n asks for.
+    /// End after so many seconds without a message, with exit code 3 when none came at all, or fewer than -n
+    /// asks for.
     #[arg(long, value_name = "SECONDS", value_parser = arguments::seconds)]
     timeout: Option<Duration>,
 }
@@ -64,10 +65,16 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
         tap.wait(heard, options.timeout.map_or(LOOK, |timeout| timeout.saturating_sub(waited).min(LOOK)));
     }
     if reader.lost() > 0 {
-        show::note(&format!("{} came faster than could be printed", show::count(reader.lost() as usize, "message")));
+        show::note(&format!(
+            "{} came faster than could be printed",
+            show::count(reader.lost() as usize, "message")
+        ));
     }
     if reader.invalid() > 0 {
-        show::note(&format!("{} were not what they said, and are left out", show::count(reader.invalid() as usize, "message")));
+        show::note(&format!(
+            "{} were not what they said, and are left out",
+            show::count(reader.invalid() as usize, "message")
+        ));
     }
     Ok(code)
 }

@@ -65,9 +65,7 @@ mod tests {
 
     #[test]
     fn every_example_is_a_command() {
-        let all = [
-            BOARD, LIST, INFO, ECHO, RATE, DELAY, PUBLISH, RECORD, REPLAY, CLEAN, DOCTOR, COMPLETIONS,
-        ];
+        let all = [BOARD, LIST, INFO, ECHO, RATE, DELAY, PUBLISH, RECORD, REPLAY, CLEAN, DOCTOR, COMPLETIONS];
         for command in all.iter().copied().flatten() {
             if let Err(error) = Cli::try_parse_from(words(command)) {
                 panic!("`{command}`: {error}");

@@ -56,7 +56,10 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
     };
     let facts = [
         ("publisher", list::publisher(colours, topic.publisher.as_deref(), life)),
-        ("readers", if topic.readers.is_empty() { "none".into() } else { show::harmless(&topic.readers.join(", ")) }),
+        (
+            "readers",
+            if topic.readers.is_empty() { "none".into() } else { show::harmless(&topic.readers.join(", ")) },
+        ),
         ("depth", topic.depth.to_string()),
         ("size", size),
         ("fingerprint", format!("{:016x}", message.fingerprint())),
@@ -81,8 +84,7 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
     let mut table = show::table(&["offset", "field", "type", "unit", "meaning"]);
     add_fields(&mut table, message, "", 0);
     if let Some(element) = &message.element {
-        let doc =
-            if let Kind::Record(record) = element { words(&record.doc) } else { String::new() };
+        let doc = if let Kind::Record(record) = element { words(&record.doc) } else { String::new() };
         table.add_row([String::new(), "elements[]".into(), kind(element), String::new(), doc]);
         if let Kind::Record(record) = element {
             add_fields(&mut table, record, "elements[].", 0);

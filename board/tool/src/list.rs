@@ -61,7 +61,11 @@ fn topics(common: &Common, look: &Look, options: &Options) -> std::io::Result<()
             show::harmless(&topic.name),
             show::harmless(&topic.message.name),
             publisher(colours, topic.publisher.as_deref(), life),
-            if tools == 0 { readers.to_string() } else { format!("{readers} + {}", show::count(tools, "tool")) },
+            if tools == 0 {
+                readers.to_string()
+            } else {
+                format!("{readers} + {}", show::count(tools, "tool"))
+            },
             after[index].to_string(),
             if rate_hz > 0.0 { format!("{} Hz", show::three(rate_hz)) } else { "-".into() },
             age_ns.map_or("-".into(), show::duration),

@@ -85,7 +85,8 @@ enum Verb {
     /// Publish the messages of a recording, in the name of those who published them.
     #[command(after_help = examples::help(examples::REPLAY, ""))]
     Replay(replay::Options),
-    /// Clear away boards whose launcher is gone, and what the dead have left on boards that are up; with --board, that one alone.
+    /// Clear away boards whose launcher is gone, and what the dead have left on boards that are up; with
+    /// --board, that one alone.
     #[command(after_help = examples::help(examples::CLEAN, ""))]
     Clean,
     /// Check this machine and its boards; ends with 1 when there is a problem.

@@ -6,9 +6,9 @@ use std::path::Path;
 
 /// Makes way for a new file: one of the same name goes, if that was asked for.
 ///
-/// # Errors
-/// When there is a file and nobody said `force`, and when there is anything but a plain file: a device, a pipe or a link is never removed,
-/// since it is not what somebody means who wants to overwrite a recording.
+/// # Errors When there is a file and nobody said `force`, and when there is anything but a plain file: a
+///   device, a pipe or a link is never removed, since it is not what somebody means who wants to overwrite a
+///   recording.
 pub(crate) fn make_way(path: &Path, force: bool) -> Result<(), String> {
     let shown = path.display();
     match fs::symlink_metadata(path) {
@@ -38,7 +38,8 @@ mod tests {
     #[test]
     fn only_plain_files_are_overwritten() {
         let folder = tempfile::tempdir().unwrap();
-        let [file, link, pipe, socket] = ["file", "link", "pipe", "socket"].map(|name| folder.path().join(name));
+        let [file, link, pipe, socket] =
+            ["file", "link", "pipe", "socket"].map(|name| folder.path().join(name));
         check(&file, false, Ok(()));
         fs::write(&file, "old").unwrap();
         check(&file, false, Err("say --force"));

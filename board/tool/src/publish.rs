@@ -39,7 +39,9 @@ pub(crate) struct Options {
 const RANDOM_ELEMENTS: u64 = 2000;
 
 #[derive(Debug, thiserror::Error)]
-#[error("{why}: whoever obeys a message of yours might move. Stop it first, or say --force to publish all the same")]
+#[error(
+    "{why}: whoever obeys a message of yours might move. Stop it first, or say --force to publish all the same"
+)]
 struct Refused {
     why: String,
 }

@@ -63,7 +63,8 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
     output::make_way(&options.output, options.force)?;
     let recorder = Recorder::new(&options.output, &manifest)?;
     let begin = clock::monotonic();
-    let mut session = Session { recorder, sources: Vec::new(), begin, looked: begin, said: 0, watch, tap, options };
+    let mut session =
+        Session { recorder, sources: Vec::new(), begin, looked: begin, said: 0, watch, tap, options };
     for topic in manifest.topics {
         session.open(topic.name)?;
     }

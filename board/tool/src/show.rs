@@ -6,7 +6,8 @@ use comfy_table::{Table, presets};
 use serde_json::Value;
 use std::io::{self, IsTerminal as _, Write as _};
 
-/// A line on the standard output. What others have said, in a message or a name, goes through [`harmless`] first.
+/// A line on the standard output. What others have said, in a message or a name, goes through [`harmless`]
+/// first.
 pub(crate) fn line(text: &str) -> io::Result<()> {
     writeln!(io::stdout(), "{text}")
 }

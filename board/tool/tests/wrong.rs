@@ -36,7 +36,9 @@ fn whoever_would_be_obeyed_says_force() {
         let arguments = [&["publish"], arguments].concat();
         let (code, stdout, stderr) = said(&name, &arguments);
         match refused {
-            Some(why) => assert!(code == Some(1) && stderr.contains(why) && stderr.contains("--force"), "{stderr}"),
+            Some(why) => {
+                assert!(code == Some(1) && stderr.contains(why) && stderr.contains("--force"), "{stderr}")
+            }
             None => assert!(code == Some(0) && stdout.contains("published 1 message on"), "{stdout}{stderr}"),
         }
     };
@@ -62,7 +64,10 @@ fn waiting_is_said_and_has_an_end() {
     let check = |arguments: &[&str]| {
         let (code, _, stderr) = said(&name, arguments);
         assert_eq!(code, Some(3), "{arguments:?}: {stderr}");
-        assert!(stderr.contains("waiting for a message on `plan/path` (`somebody` is not there)"), "{stderr}");
+        assert!(
+            stderr.contains("waiting for a message on `plan/path` (`somebody` is not there)"),
+            "{stderr}"
+        );
     };
     check(&["echo", "plan/path", "-n", "1", "--timeout", "1.3"]);
     check(&["delay", "plan/path", "-n", "1", "--timeout", "1.3"]);
@@ -77,7 +82,10 @@ fn waiting_is_said_and_has_an_end() {
         child.as_mut().unwrap().try_wait().unwrap().is_some()
     });
     let output = child.take().unwrap().wait_with_output().unwrap();
-    assert_eq!((output.status.code(), output.stdout.iter().filter(|&&byte| byte == b'\n').count()), (Some(3), 1));
+    assert_eq!(
+        (output.status.code(), output.stdout.iter().filter(|&&byte| byte == b'\n').count()),
+        (Some(3), 1)
+    );
     drop((publisher, tap));
     host.take_down().unwrap();
 }
@@ -94,8 +102,10 @@ fn readers_end_with_the_board() {
     ];
     let tools = commands.map(|arguments| begun(&mut command(&name, arguments)));
     let board = host.switchboard();
-    let readers = || (0..128).filter(|&slot| board.topic(1).unwrap().wakes(slot)).count();
-    wait_for(|| readers() == 3 && board.topic(2).unwrap().count.load(Ordering::Acquire) > 0);
+    let readers = |topic: u32| (0..128).filter(|&slot| board.topic(topic).unwrap().wakes(slot)).count();
+    let published = || board.topic(2).unwrap().count.load(Ordering::Acquire) > 0;
+    // The one that reads all topics comes to the last one at the end.
+    wait_for(|| readers(1) == 3 && readers(3) == 1 && published());
     host.take_down().unwrap();
     for (tool, arguments) in tools.into_iter().zip(commands) {
         let output = tool.wait_with_output().unwrap();
@@ -113,7 +123,9 @@ fn a_text_on_the_board_gives_a_terminal_no_orders() {
     let bytes = tap.manifest().topic("mission/order").unwrap().1.message.from_json(&text).unwrap();
     let publisher = tap.publisher("mission/order").unwrap();
     publisher.publish(&bytes).unwrap();
-    for arguments in [&["echo", "mission/order", "-n", "1"][..], &["echo", "mission/order", "--field", "room", "-n", "1"]] {
+    for arguments in
+        [&["echo", "mission/order", "-n", "1"][..], &["echo", "mission/order", "--field", "room", "-n", "1"]]
+    {
         let mut child = begun(&mut command(&name, arguments));
         wait_for(|| {
             tap.wait(tap.bell(), Duration::from_millis(5));
@@ -179,7 +191,9 @@ fn clean_cleans_what_it_is_told() {
 
 #[test]
 fn a_board_that_is_not_there_is_an_error() {
-    for arguments in [&["doctor"][..], &["list"], &["echo", "x"], &["info", "x"], &["rate"], &["record", "-o", "x"]] {
+    for arguments in
+        [&["doctor"][..], &["list"], &["echo", "x"], &["info", "x"], &["rate"], &["record", "-o", "x"]]
+    {
         let (code, _, stderr) = said(&name("nosuch"), arguments);
         assert!(code == Some(1) && stderr.contains("there is no board"), "{arguments:?}: {stderr}");
     }
@@ -208,7 +222,8 @@ fn a_closed_pipe_ends_quietly() {
     // Nor is anything lost with the standard error closed or full.
     for target in ["/dev/full", "/dev/null"] {
         let target = std::fs::OpenOptions::new().write(true).open(target).unwrap();
-        let status = command(&name, &["echo", "nothing"]).stdout(Stdio::null()).stderr(target).status().unwrap();
+        let status =
+            command(&name, &["echo", "nothing"]).stdout(Stdio::null()).stderr(target).status().unwrap();
         assert_eq!(status.code(), Some(1));
     }
     host.take_down().unwrap();
@@ -244,7 +259,8 @@ fn a_recording_follows_the_board() {
     let file = folder.path().join("run.mcap");
     let recorder = tool(&name, &["record", "-o", file.to_str().unwrap()]);
     wait_for(|| Recording::open(&file).is_ok());
-    let added = Topic { name: "shadow/wheels".into(), ..host.manifest().topic("wheels/desired").unwrap().1.clone() };
+    let added =
+        Topic { name: "shadow/wheels".into(), ..host.manifest().topic("wheels/desired").unwrap().1.clone() };
     host.add_topics(vec![added]).unwrap();
     let mut tap = Tap::join(host.place().clone(), "test").unwrap();
     let publisher = tap.publisher("shadow/wheels").unwrap();
@@ -276,7 +292,12 @@ fn a_full_disk_is_said_at_once_with_what_is_kept() {
     let script = "mount -t tmpfs -o size=3m tmpfs \"$1\" || exit 77; \"$2\" --board \"$3\" record -o \"$1/run.mcap\"; \
                   code=$?; cp \"$1/run.mcap\" \"$4\"; exit $code";
     let mut recorder = Command::new("unshare");
-    recorder.args(["-m", "sh", "-c", script, "sh"]).arg(&small).arg(env!("CARGO_BIN_EXE_board")).arg(&name).arg(&kept);
+    recorder
+        .args(["-m", "sh", "-c", script, "sh"])
+        .arg(&small)
+        .arg(env!("CARGO_BIN_EXE_board"))
+        .arg(&name)
+        .arg(&kept);
     let Ok(mut child) = recorder.stdout(Stdio::null()).stderr(Stdio::piped()).spawn() else {
         println!("skipped: there is no unshare");
         return;
@@ -306,7 +327,10 @@ fn a_full_disk_is_said_at_once_with_what_is_kept() {
         let recording = Recording::open(&kept).unwrap();
         assert!(!recording.is_complete());
         let messages = recording.as_recorded(|_| true).map(Result::unwrap).count();
-        assert!(messages > 10 && stderr.contains(&format!("its first {messages} messages")), "{messages}: {stderr}");
+        assert!(
+            messages > 10 && stderr.contains(&format!("its first {messages} messages")),
+            "{messages}: {stderr}"
+        );
     }
     drop((publisher, tap));
     host.take_down().unwrap();

@@ -72,4 +72,3 @@ pub(crate) fn wait_for(mut condition: impl FnMut() -> bool) {
         board::clock::sleep(Duration::from_millis(5));
     }
 }
-
