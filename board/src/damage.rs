@@ -35,19 +35,18 @@ pub(crate) struct Known {
     said: BTreeSet<String>,
 }
 
-impl Default for Known {
-    fn default() -> Self {
+impl Known {
+    /// Nobody was started yet, and the table of contents was just written.
+    pub(crate) fn with_manifest(manifest_file: Option<Version>) -> Self {
         Self {
             generations: 1,
             prepared: BTreeMap::new(),
             speakers: BTreeMap::new(),
-            manifest_file: None,
+            manifest_file,
             said: BTreeSet::new(),
         }
     }
-}
 
-impl Known {
     /// The generation of the service that is to be started in this place.
     pub(crate) fn prepare(&mut self, slot: u32, role: &str) -> u32 {
         self.generations += 1;

@@ -60,7 +60,7 @@ pub enum HostError {
         pid: u32,
     },
     /// There is not enough shared memory, or something else for it.
-    #[error("the board `{board}` with its {topics} topics cannot be made: {lack}")]
+    #[error("the board `{board}` with {topics} topic{} cannot be made: {lack}", if *topics == 1 { "" } else { "s" })]
     Lack {
         /// The board.
         board: String,
@@ -166,20 +166,20 @@ impl Host {
             }
         }
         let manifest = Manifest { launcher_pid: std::process::id(), ..manifest };
-        let host = Self {
+        manifest.write(&place)?;
+        let known = Known::with_manifest(Manifest::version(&place));
+        Ok(Self {
             page_file: identity(&place.file(SWITCHBOARD)),
             files: place.shared_memory(),
             place,
             switchboard,
             manifest,
             lockstep,
-            known: Mutex::default(),
+            known: Mutex::new(known),
             topics,
             member: Some(member),
             lock: Some(lock),
-        };
-        host.write_manifest()?;
-        Ok(host)
+        })
     }
 
     pub(crate) fn write_manifest(&self) -> io::Result<()> {
@@ -215,21 +215,24 @@ impl Host {
     /// # Errors
     /// When the board holds no more, or shared memory fails.
     pub fn add_topics(&mut self, topics: Vec<Topic>) -> Result<(), HostError> {
-        let Some(member) = &self.member else { return Ok(()) };
         let before = self.manifest.topics.len();
-        for topic in topics {
-            if self.manifest.topic(&topic.name).is_some() {
-                continue;
-            }
-            if self.manifest.topics.len() == switchboard::TOPICS {
-                return Err(HostError::TooManyTopics { topics: switchboard::TOPICS + 1 });
-            }
-            self.topics.push(member.create(&topic.name, shape_of(&topic))?);
-            self.manifest.topics.push(topic);
-        }
+        let added = topics.into_iter().try_for_each(|topic| self.add_topic(topic));
+        // Also those before one that could not be made.
         if self.manifest.topics.len() > before {
             self.write_manifest()?;
         }
+        added
+    }
+
+    fn add_topic(&mut self, topic: Topic) -> Result<(), HostError> {
+        let Some(member) = self.member.as_ref().filter(|_| self.manifest.topic(&topic.name).is_none()) else {
+            return Ok(());
+        };
+        if self.manifest.topics.len() == switchboard::TOPICS {
+            return Err(HostError::TooManyTopics { topics: switchboard::TOPICS + 1 });
+        }
+        self.topics.push(member.create(&topic.name, shape_of(&topic))?);
+        self.manifest.topics.push(topic);
         Ok(())
     }
 
