@@ -192,6 +192,7 @@ fn board_block(params: &Params) -> Result<Block, Failure> {
         publisher: Some(publisher.into()),
         readers: vec![reader.into()],
         depth: 4,
+        elements: params.bytes,
         message: Frame::description(),
     };
     let topics = vec![topic("ping", "ping", "pong"), topic("pong", "pong", "ping")];

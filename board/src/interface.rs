@@ -49,6 +49,9 @@ pub struct PortDescription {
     pub required: bool,
     /// For readers: how many messages may wait.
     pub depth: usize,
+    /// For publishers of messages with elements: for how many there is room from the start.
+    #[serde(default)]
+    pub elements: usize,
     /// Whether a message there makes the service take a step.
     pub wakes: bool,
     /// The type of its messages.

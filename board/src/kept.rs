@@ -3,14 +3,14 @@
 //! A mapped file with two halves: the state is written into the one that is not in use, then the halves change places. A process that dies in
 //! between leaves the state before. Nothing is asked of the kernel, so a service can save in every step.
 
+use crate::private;
 use crate::shared::Shared;
 use messages::Time;
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use serde::{Serialize, de::DeserializeOwned};
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io;
 use std::marker::PhantomData;
-use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -30,6 +30,8 @@ pub struct Kept<S> {
     last: Vec<u8>,
     next: Vec<u8>,
     due: Option<Time>,
+    /// Whether it was said that the state cannot be kept.
+    complained: bool,
     marker: PhantomData<S>,
 }
 
@@ -58,7 +60,15 @@ impl Home {
 
 impl<S: Serialize + DeserializeOwned> Kept<S> {
     pub(crate) fn new(home: Option<Home>) -> Self {
-        Self { home, page: None, last: Vec::new(), next: Vec::new(), due: None, marker: PhantomData }
+        Self {
+            home,
+            page: None,
+            last: Vec::new(),
+            next: Vec::new(),
+            due: None,
+            complained: false,
+            marker: PhantomData,
+        }
     }
 
     /// What the predecessor saved; `None` on the first start, and when it was of another version.
@@ -76,14 +86,26 @@ impl<S: Serialize + DeserializeOwned> Kept<S> {
         if serde_json::to_writer(&mut self.next, state).is_err() || self.next == self.last {
             return;
         }
-        if self.page.as_ref().is_none_or(|page| page.room < self.next.len()) {
-            self.page = Page::create(&home.file, (2 * self.next.len()).max(ROOM))
-                .inspect_err(|error| tracing::warn!(%error, "the state cannot be kept"))
-                .ok();
+        let wanted = self.next.len();
+        if self.page.as_ref().is_none_or(|page| page.room < wanted) {
+            match Page::create(&home.file, (2 * wanted).max(ROOM)) {
+                Ok(page) => self.page = Some(page),
+                Err(error) => return self.complain(&error),
+            }
         }
         if let Some(page) = &mut self.page {
             page.write(&self.next);
             std::mem::swap(&mut self.last, &mut self.next);
+            self.complained = false;
+        }
+    }
+
+    /// What was kept last stays, and the next state is tried again; it is said once, until a state can be
+    /// kept again.
+    #[cold]
+    fn complain(&mut self, error: &io::Error) {
+        if !std::mem::replace(&mut self.complained, true) {
+            tracing::warn!(%error, "the state cannot be kept, and a successor would begin with an older one");
         }
     }
 
@@ -110,17 +132,14 @@ impl Page {
     fn create(path: &Path, room: usize) -> io::Result<Self> {
         let room = room.next_multiple_of(64);
         let temporary = path.with_extension("new");
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .mode(0o600)
-            .open(&temporary)?;
+        // What a process has left that died in here.
+        private::remove(&temporary)?;
+        let file = private::create(&temporary)?;
         // Reserved, not only sized: with shared memory full, this fails, and not the first write into the page (SIGBUS).
         let size = HEADER + 2 * room;
-        rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, size as u64)?;
-        let page = Self::map(&file, size)?;
+        let reserved = rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, size as u64);
+        let page = reserved.map_err(io::Error::from).and_then(|()| Self::map(&file, size));
+        let page = page.map_err(private::at(&temporary)).inspect_err(|_| _ = private::remove(&temporary))?;
         if let Ok(old) = Self::open(path)
             && let Some(bytes) = old.read().filter(|bytes| bytes.len() <= room)
         {
@@ -131,7 +150,7 @@ impl Page {
     }
 
     fn open(path: &Path) -> io::Result<Self> {
-        let file = OpenOptions::new().read(true).write(true).open(path)?;
+        let file = private::open(path)?;
         let size = usize::try_from(file.metadata()?.len()).unwrap_or(0);
         if size < HEADER {
             return Err(io::Error::new(io::ErrorKind::InvalidData, "too short for a state"));

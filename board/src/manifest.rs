@@ -3,11 +3,14 @@
 //! The launcher writes it before any service lives. With it, any tool can read every topic, also those of services it never heard of.
 
 use crate::place::Place;
-use messages::Description;
+use crate::private::{self, Version, version};
+use messages::{Description, elements_offset};
 use serde::{Deserialize, Serialize};
 use std::io;
 
 const FILE: &str = "board.json";
+/// Elements that a message has room for where nobody says how many it takes.
+pub const ELEMENTS: usize = 64;
 
 /// One topic of a board.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -20,8 +23,27 @@ pub struct Topic {
     pub readers: Vec<String>,
     /// How many messages may wait for a reader.
     pub depth: usize,
+    /// For messages with elements: for how many there is room from the start. Longer ones get room when they
+    /// come, if there is memory.
+    #[serde(default = "default_elements")]
+    pub elements: usize,
     /// The type of its messages.
     pub message: Description,
+}
+
+fn default_elements() -> usize {
+    ELEMENTS
+}
+
+impl Topic {
+    /// Bytes of a message for which there is room from the start.
+    pub fn room_bytes(&self) -> usize {
+        match &self.message.element {
+            Some(element) => elements_offset(self.message.size)
+                .saturating_add(self.elements.max(1).saturating_mul(element.size())),
+            None => self.message.size,
+        }
+    }
 }
 
 /// The table of contents.
@@ -51,9 +73,12 @@ impl Manifest {
     /// # Errors
     /// When the folder cannot be written.
     pub fn write(&self, place: &Place) -> io::Result<()> {
-        let temporary = place.file("board.json.new");
-        std::fs::write(&temporary, serde_json::to_vec(self)?)?;
-        std::fs::rename(temporary, place.file(FILE))
+        private::replace(&place.file(FILE), &serde_json::to_vec(self)?)
+    }
+
+    /// Tells whether it has changed since.
+    pub(crate) fn version(place: &Place) -> Option<Version> {
+        version(&place.file(FILE))
     }
 
     /// Reads that of a board.
@@ -61,6 +86,8 @@ impl Manifest {
     /// # Errors
     /// When there is no such board, or the file is broken.
     pub fn read(place: &Place) -> io::Result<Self> {
-        Ok(serde_json::from_slice(&std::fs::read(place.file(FILE))?)?)
+        let path = place.file(FILE);
+        let bytes = std::fs::read(&path).map_err(private::at(&path))?;
+        serde_json::from_slice(&bytes).map_err(io::Error::from).map_err(private::at(&path))
     }
 }

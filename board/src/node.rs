@@ -3,14 +3,16 @@
 use crate::host::{health_topic, shadow_role, shadow_topic};
 use crate::interface::{Direction, PortDescription};
 use crate::kept::{Home, Kept};
-use crate::manifest::Manifest;
+use crate::lack::Lack;
+use crate::manifest::{ELEMENTS, Manifest};
 use crate::place::Place;
 use crate::port::{Latest, Publisher, PublisherLink, Queue, Reader, ReaderLink};
 use crate::shared::Shared;
 use crate::switchboard::Switchboard;
-use crate::transport::{Member, TransportError};
+use crate::transport::{Member, Room, TransportError};
 use messages::Message;
 use serde::{Serialize, de::DeserializeOwned};
+use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -89,7 +91,12 @@ pub(crate) struct Joined {
     pub(crate) member: Member,
     pub(crate) place: Place,
     pub(crate) publishers: Vec<PublisherLink>,
+    /// Files that its ports may still come to open.
+    expected_files: Cell<u64>,
 }
+
+/// Files that a reader opens for a publisher that it meets.
+const FILES_A_PUBLISHER: u64 = 2;
 
 impl Joined {
     /// Joins the board as `role`, in a slot that the launcher has prepared or in a free one.
@@ -121,7 +128,8 @@ impl Joined {
             }
         })?;
         let shared = Rc::new(Shared::new(switchboard, slot, generation));
-        Ok(Self { shared, manifest, member, place, publishers: Vec::new() })
+        let expected_files = Cell::new(0);
+        Ok(Self { shared, manifest, member, place, publishers: Vec::new(), expected_files })
     }
 
     pub(crate) fn open_reader(
@@ -131,6 +139,7 @@ impl Joined {
         depth: usize,
     ) -> Result<ReaderLink, JoinError> {
         let (index, _) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
+        self.expect_files(topic, FILES_A_PUBLISHER)?;
         let reader = self.member.open(topic, fingerprint)?.reader(depth)?;
         Ok(ReaderLink {
             shared: Rc::clone(&self.shared),
@@ -146,14 +155,27 @@ impl Joined {
         &mut self,
         topic: &str,
         fingerprint: u64,
-        bytes: usize,
+        grows: bool,
     ) -> Result<PublisherLink, JoinError> {
-        let (index, _) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
-        let publisher = Rc::new(self.member.open(topic, fingerprint)?.publisher(bytes)?);
+        let (index, entry) = self.manifest.topic(topic).ok_or_else(|| self.no_topic(topic))?;
+        let room = Room { bytes: entry.room_bytes(), grows };
+        // One for each reader that it meets, and one for a tool.
+        self.expect_files(topic, entry.readers.len() as u64 + 1)?;
+        let publisher = Rc::new(self.member.open(topic, fingerprint)?.publisher(room)?);
         let link =
             PublisherLink { shared: Rc::clone(&self.shared), topic: index, publisher, measures: false };
         self.publishers.push(link.clone());
         Ok(link)
+    }
+
+    /// The others of a topic come later, and whom a process then cannot open a file for hears nothing of it:
+    /// so it is refused now.
+    fn expect_files(&self, topic: &str, more: u64) -> Result<(), TransportError> {
+        self.expected_files.set(self.expected_files.get() + more);
+        match Lack::of_files(self.expected_files.get()) {
+            Some(lack) => Err(TransportError::lacking(&format!("topic `{topic}` cannot be opened"), lack)),
+            None => Ok(()),
+        }
     }
 
     fn no_topic(&self, topic: &str) -> JoinError {
@@ -278,7 +300,20 @@ impl Node {
     /// # Errors
     /// When the topic is not on the board, carries messages of another layout, or belongs to another service.
     pub fn publisher<T: Message>(&mut self, topic: &str) -> Result<Publisher<T>, JoinError> {
-        self.publisher_of(topic, false)
+        self.publisher_of(topic, false, ELEMENTS)
+    }
+
+    /// As `publisher`, for messages of up to so many elements. Their memory is reserved before the robot
+    /// starts; that of longer ones is asked for when they come, and may not be there.
+    ///
+    /// # Errors
+    /// As `publisher`.
+    pub fn publisher_holding<T: Message>(
+        &mut self,
+        topic: &str,
+        elements: usize,
+    ) -> Result<Publisher<T>, JoinError> {
+        self.publisher_of(topic, false, elements)
     }
 
     /// As `publisher`, for readings of the world: their age begins with their publication, whatever else was read in the same step. Without it the age of
@@ -287,11 +322,16 @@ impl Node {
     /// # Errors
     /// As `publisher`.
     pub fn sensor_publisher<T: Message>(&mut self, topic: &str) -> Result<Publisher<T>, JoinError> {
-        self.publisher_of(topic, true)
+        self.publisher_of(topic, true, ELEMENTS)
     }
 
-    fn publisher_of<T: Message>(&mut self, topic: &str, measures: bool) -> Result<Publisher<T>, JoinError> {
-        self.describe::<T>(topic, Direction::Publish, true, 0);
+    fn publisher_of<T: Message>(
+        &mut self,
+        topic: &str,
+        measures: bool,
+        elements: usize,
+    ) -> Result<Publisher<T>, JoinError> {
+        self.describe::<T>(topic, Direction::Publish, true, 0, if T::HAS_ELEMENTS { elements } else { 0 });
         let role = self.role.clone();
         let Some(joined) = &mut self.joined else { return Ok(Publisher::new(topic, None)) };
         let (role, topic) =
@@ -302,10 +342,7 @@ impl Node {
         if let Some(publisher) = owner.filter(|owner| *owner != role) {
             return Err(JoinError::SecondPublisher { topic: topic.to_owned(), publisher, role });
         }
-        // Room for a few dozen elements from the start; the memory grows by itself.
-        let bytes =
-            if T::HAS_ELEMENTS { size_of::<T>() + 64 * size_of::<T::Element>() } else { size_of::<T>() };
-        let mut link = joined.open_publisher(topic, fingerprint, bytes)?;
+        let mut link = joined.open_publisher(topic, fingerprint, T::HAS_ELEMENTS)?;
         link.measures = measures;
         if let Some(entry) = joined.shared.switchboard.topic(link.topic)
             && link.is_heard()
@@ -353,7 +390,7 @@ impl Node {
         required: bool,
         depth: usize,
     ) -> Result<Option<ReaderLink>, JoinError> {
-        self.describe::<T>(topic, direction, required, depth);
+        self.describe::<T>(topic, direction, required, depth, 0);
         let Some(joined) = &self.joined else { return Ok(None) };
         if !required && joined.manifest.topic(topic).is_none() {
             return Ok(None);
@@ -362,7 +399,14 @@ impl Node {
         Ok(Some(joined.open_reader(topic, fingerprint, depth)?))
     }
 
-    fn describe<T: Message>(&mut self, topic: &str, direction: Direction, required: bool, depth: usize) {
+    fn describe<T: Message>(
+        &mut self,
+        topic: &str,
+        direction: Direction,
+        required: bool,
+        depth: usize,
+        elements: usize,
+    ) {
         let message = T::description();
         let fingerprint = format!("{:016x}", message.fingerprint());
         self.ports.push(PortDescription {
@@ -370,6 +414,7 @@ impl Node {
             direction,
             required,
             depth,
+            elements,
             wakes: false,
             message,
             fingerprint,

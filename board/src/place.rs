@@ -1,8 +1,10 @@
 //! Where a board lies in shared memory, and how it is found and removed.
 
+use crate::lack::SHARED_MEMORY;
+use crate::{lock, private};
 use std::fs;
 use std::io;
-use std::os::unix::fs::{DirBuilderExt as _, MetadataExt as _, PermissionsExt as _};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 /// Longest board name, in bytes. The transport takes 60 bytes for folder and prefix together.
@@ -66,7 +68,16 @@ impl Place {
 
     /// Whether a folder of this board exists.
     pub fn exists(&self) -> bool {
-        own_folder(&boards_folder()).is_ok() && own_folder(&self.root).is_ok()
+        self.check().is_ok()
+    }
+
+    /// Whether the board's folder exists, and it and the one around it are this user's own.
+    ///
+    /// # Errors
+    /// Of kind `NotFound` when it does not exist; when somebody else has made it, with its path and owner.
+    pub(crate) fn check(&self) -> io::Result<()> {
+        own_folder(&boards_folder())?;
+        own_folder(&self.root).map(|_| ())
     }
 
     /// Makes the folder, for its owner alone.
@@ -74,9 +85,8 @@ impl Place {
     /// # Errors
     /// When it exists, belongs to another user, or cannot be made.
     pub fn create(&self) -> io::Result<()> {
-        let folder = boards_folder();
-        make_boards_folder(&folder)?;
-        fs::DirBuilder::new().mode(0o700).create(&self.root)
+        make_boards_folder(&boards_folder())?;
+        private::create_folder(&self.root)
     }
 
     /// Removes everything that lies here, used or not. Only for a board whose processes are gone, and by whoever has the [`Turn`].
@@ -84,25 +94,52 @@ impl Place {
     /// # Errors
     /// When a file cannot be removed.
     pub fn remove(&self) -> io::Result<()> {
-        for file in self.shared_memory() {
-            ignore_missing(fs::remove_file(file))?;
-        }
+        self.remove_shared_memory()?;
         // Everybody may write into /dev/shm. A folder that is not ours, or a link, could lead anywhere.
         match own_folder(&boards_folder()) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
             other => _ = other?,
         }
-        ignore_missing(fs::remove_dir_all(&self.root))?;
-        Ok(())
+        match fs::remove_dir_all(&self.root) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(private::at(&self.root)(error)),
+            _ => Ok(()),
+        }
+    }
+
+    /// Removes the board's files in shared memory outside its folder.
+    pub(crate) fn remove_shared_memory(&self) -> io::Result<()> {
+        self.shared_memory().iter().try_for_each(|file| {
+            private::remove(file).map_err(|error| match fs::symlink_metadata(file) {
+                Ok(found) if error.kind() == io::ErrorKind::PermissionDenied => io::Error::new(
+                    error.kind(),
+                    format!(
+                        "{error}; it belongs to user {}: have it removed, or choose another name with --board",
+                        found.uid()
+                    ),
+                ),
+                _ => error,
+            })
+        })
     }
 
     /// The board's files in shared memory outside its folder.
     pub fn shared_memory(&self) -> Vec<PathBuf> {
-        let Ok(entries) = fs::read_dir("/dev/shm") else { return Vec::new() };
+        let Ok(entries) = fs::read_dir(SHARED_MEMORY) else { return Vec::new() };
         let ours = |path: &PathBuf| {
             path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.starts_with(&self.prefix))
         };
         entries.flatten().map(|entry| entry.path()).filter(ours).collect()
+    }
+}
+
+/// Whether the folder of the boards is this user's own, or not there.
+///
+/// # Errors
+/// When somebody else has made it, with its path and owner.
+pub(crate) fn check_folder() -> io::Result<()> {
+    match own_folder(&boards_folder()) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
     }
 }
 
@@ -122,13 +159,16 @@ pub fn places() -> Vec<Place> {
     places
 }
 
-/// Shared memory of this user's boards that belongs to no folder: somebody removed the folder by hand. Ask for it under [`Turn`] only, or
-/// it may belong to a board that is being taken down.
-pub fn orphans() -> Vec<PathBuf> {
+/// Shared memory of this user's boards that belongs to no folder and no living launcher: somebody removed the
+/// folder by hand. Ask for it under [`Turn`] only, or it may belong to a board that is being taken down.
+///
+/// # Errors
+/// When it cannot be told whether a launcher lives.
+pub fn orphans() -> io::Result<Vec<PathBuf>> {
     let prefixes: Vec<String> = places().into_iter().map(|place| place.prefix).collect();
     let user = rustix::process::getuid().as_raw();
-    let Ok(entries) = fs::read_dir("/dev/shm") else { return Vec::new() };
-    entries
+    let entries = fs::read_dir(SHARED_MEMORY).map_err(private::at(Path::new(SHARED_MEMORY)))?;
+    let mut orphans: Vec<PathBuf> = entries
         .flatten()
         .filter(|entry| {
             let name = entry.file_name();
@@ -138,7 +178,23 @@ pub fn orphans() -> Vec<PathBuf> {
                 && entry.metadata().is_ok_and(|found| found.is_file() && found.uid() == user)
         })
         .map(|entry| entry.path())
-        .collect()
+        .collect();
+    if !orphans.is_empty() {
+        // A board whose folder was deleted under its launcher is no orphan: its robot may be driving.
+        let held = lock::holders()?;
+        let is_held = |file: &PathBuf| {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            held.iter().any(|(place, _)| name.starts_with(place.prefix()))
+        };
+        orphans.retain(|file| !is_held(file));
+    }
+    Ok(orphans)
+}
+
+/// Whether this is a segment of some board, by its name.
+pub(crate) fn is_segment(path: &Path) -> bool {
+    path.parent() == Some(Path::new(SHARED_MEMORY))
+        && path.file_name().is_some_and(|name| is_prefixed(&name.to_string_lossy()))
 }
 
 /// Whether a name in shared memory begins as a board's memory does: `c`, eight hexadecimal digits, `_`.
@@ -167,9 +223,11 @@ impl Turn {
             make_boards_folder(&folder)?;
             let file = match fs::File::open(&folder) {
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
-                other => other?,
+                other => other.map_err(private::at(&folder))?,
             };
-            rustix::fs::flock(&file, rustix::fs::FlockOperation::LockExclusive)?;
+            rustix::fs::flock(&file, rustix::fs::FlockOperation::LockExclusive)
+                .map_err(io::Error::from)
+                .map_err(private::at(&folder))?;
             // Whoever took down the last board meanwhile has removed the folder that we hold.
             if fs::symlink_metadata(&folder)
                 .is_ok_and(|found| file.metadata().is_ok_and(|ours| ours.ino() == found.ino()))
@@ -188,14 +246,16 @@ impl Drop for Turn {
 }
 
 fn make_boards_folder(folder: &Path) -> io::Result<()> {
-    match fs::DirBuilder::new().mode(0o700).create(folder) {
+    match private::create_folder(folder) {
+        // Removed again between its making and the setting of its mode.
+        Err(error) if error.kind() == io::ErrorKind::NotFound && Path::new(SHARED_MEMORY).exists() => Ok(()),
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
             match own_folder(folder) {
                 // Removed by another process just now; whoever needs it tries again.
                 Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
                 Err(error) => Err(error),
                 Ok(0o700) => Ok(()),
-                Ok(_) => fs::set_permissions(folder, fs::Permissions::from_mode(0o700)),
+                Ok(_) => private::close_folder(folder),
             }
         }
         other => other,
@@ -205,7 +265,7 @@ fn make_boards_folder(folder: &Path) -> io::Result<()> {
 /// The mode of a folder, which must be one, and this user's: somebody else may have made it first, to look into our boards, or to have
 /// their files removed by us.
 fn own_folder(folder: &Path) -> io::Result<u32> {
-    let found = fs::symlink_metadata(folder)?;
+    let found = fs::symlink_metadata(folder).map_err(private::at(folder))?;
     let user = rustix::process::getuid().as_raw();
     if found.is_dir() && found.uid() == user {
         return Ok(found.mode() & 0o777);
@@ -223,12 +283,5 @@ fn own_folder(folder: &Path) -> io::Result<u32> {
 /// The folder in which the boards of this user lie.
 pub fn boards_folder() -> PathBuf {
     // Shared memory rather than the temporary directory: three times faster to set up, and gone after a power loss.
-    PathBuf::from(format!("/dev/shm/corkboard-{}", rustix::process::getuid().as_raw()))
-}
-
-fn ignore_missing(result: io::Result<()>) -> io::Result<()> {
-    match result {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        other => other,
-    }
+    PathBuf::from(format!("{SHARED_MEMORY}/corkboard-{}", rustix::process::getuid().as_raw()))
 }

@@ -1,7 +1,7 @@
 //! The typed ports of a service: thin checked views over bytes in shared memory.
 
 use crate::shared::{Shared, Visibility};
-use crate::transport::{Envelope, RawLoan, RawMessage, RawPublisher, RawReader, TransportError};
+use crate::transport::{Envelope, Forged, RawLoan, RawMessage, RawPublisher, RawReader, TransportError};
 use messages::{Message, Stamped, Time, View, elements_offset};
 use std::marker::PhantomData;
 use std::rc::Rc;
@@ -38,7 +38,7 @@ impl ReaderLink {
             if valid(message.bytes()) {
                 *held = Some(message);
             } else {
-                self.shared.invalid.set(self.shared.invalid.get() + 1);
+                self.shared.count_invalid();
             }
             // The count says whether another one waits; asking the transport costs as much as a message.
             let count = self
@@ -61,7 +61,7 @@ impl ReaderLink {
                 *held = Some(message);
                 return true;
             }
-            self.shared.invalid.set(self.shared.invalid.get() + 1);
+            self.shared.count_invalid();
         }
         false
     }
@@ -71,7 +71,7 @@ impl ReaderLink {
     fn next(&mut self) -> Option<RawMessage> {
         loop {
             let message = match self.early.take() {
-                None => self.reader.receive()?,
+                None => self.receive()?,
                 Some(early) => early,
             };
             let envelope = *message.envelope();
@@ -82,17 +82,36 @@ impl ReaderLink {
                     return None;
                 }
                 Visibility::Never => {
-                    self.shared.invalid.set(self.shared.invalid.get() + 1);
+                    self.shared.count_invalid();
                     continue;
                 }
             }
             // After a hand-over the last words of the predecessor may still arrive; they do not count.
-            if envelope.generation < self.generation {
+            if envelope.generation < self.generation && self.has_heard_true() {
                 continue;
             }
             self.generation = envelope.generation;
             return Some(message);
         }
+    }
+
+    /// The next message that waits, seen or not by this step's clock. One that is not what it says is counted
+    /// and left out.
+    #[inline(always)]
+    pub(crate) fn receive(&mut self) -> Option<RawMessage> {
+        loop {
+            match self.reader.receive()? {
+                Ok(message) => return Some(message),
+                Err(Forged) => self.shared.count_invalid(),
+            }
+        }
+    }
+
+    /// Whether the launcher has given the generation that was heard last. One that it has not given yet is
+    /// forged, and would mute the topic's true publisher for ever.
+    #[cold]
+    fn has_heard_true(&self) -> bool {
+        self.generation <= self.shared.switchboard.header().generations.load(Ordering::Acquire)
     }
 
     /// Counts the messages that overflow has swallowed before this one.
@@ -330,7 +349,7 @@ pub(crate) fn release_held(shared: &Rc<Shared>) {
             link.send_in_generation(loan, shared.clock(), origin, shared.generation)
         });
         if let Err(error) = sent {
-            tracing::error!(topic, %error, "message lost");
+            shared.lose(&format!("number {topic}"), &error);
         }
     }
 }
@@ -363,7 +382,8 @@ impl<T: Message> Publisher<T> {
 
     /// Memory for a message with so many elements, to be filled in place and sent. What is not written holds old bytes.
     ///
-    /// `None` when the transport has no memory left, which is reported once a second at most.
+    /// `None` when the transport has no memory left, which counts as a lost message, and is reported once a
+    /// second at most.
     pub fn loan(&mut self, elements: usize) -> Option<Loan<'_, T>> {
         let bytes = if T::HAS_ELEMENTS {
             elements_offset(size_of::<T>()) + elements * size_of::<T::Element>()
@@ -380,7 +400,7 @@ impl<T: Message> Publisher<T> {
                 Some(Loan { raw, link, name: &self.name, elements, marker: PhantomData })
             }
             Err(error) => {
-                tracing::error!(topic = self.name, %error, "message lost");
+                link.shared.lose(&self.name, &error);
                 None
             }
         }
@@ -416,7 +436,7 @@ impl<T: Message> Loan<'_, T> {
     /// Publishes it.
     pub fn send(self) {
         if let Err(error) = self.link.send(self.raw) {
-            tracing::error!(topic = self.name, %error, "message lost");
+            self.link.shared.lose(self.name, &error);
         }
     }
 }

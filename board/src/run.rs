@@ -5,14 +5,17 @@ use crate::example;
 use crate::health::StepTimes;
 use crate::host;
 use crate::interface::{About, Interface};
+use crate::lack::Lack;
 use crate::node::{JoinError, Joined, Node};
 use crate::place::Place;
 use crate::port::{PublisherLink, bytes_of, release_held};
 use crate::shared::Shared;
 use crate::switchboard::{self, Slot, SlotState};
+use crate::{terminal, transport};
 use clap::{Arg, ArgAction, ArgMatches, Command, value_parser};
 use messages::{Health, Message as _, Parameters, ServiceState, Time};
 use std::error::Error;
+use std::io::{self, IsTerminal as _, Write as _};
 use std::process::ExitCode;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -58,7 +61,7 @@ fn run_with(
 ) -> ExitCode {
     let arguments = command(about).get_matches();
     if arguments.get_flag("example") {
-        print!("{}", example::table(about, schema, defaults));
+        say(&example::table(about, schema, defaults));
         return ExitCode::SUCCESS;
     }
     let result = if arguments.get_flag("interface") {
@@ -69,15 +72,49 @@ fn run_with(
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            // Where nobody listens any more, or the disk is full, the exit code must do.
+            let _ = writeln!(Log, "error: {error}");
             ExitCode::from(if passes_by(&*error) { EXIT_FAILED } else { EXIT_SETUP })
         }
     }
 }
 
-/// Whether an error is the board's and not the set-up's, so that another start may help.
+/// Whether an error is the board's and not the set-up's, so that another start may help: a page that was
+/// written over is mended by the launcher.
 fn passes_by(error: &(dyn Error + Send + Sync + 'static)) -> bool {
-    matches!(error.downcast_ref(), Some(JoinError::Transport(_) | JoinError::Full { .. }))
+    matches!(
+        error.downcast_ref(),
+        Some(JoinError::Transport(_) | JoinError::Full { .. } | JoinError::Unreadable { .. })
+    )
+}
+
+/// Prints an answer; whoever closes the pipe has read enough.
+fn say(text: &str) {
+    let _ = io::stdout().write_all(text.as_bytes()).and_then(|()| io::stdout().flush());
+}
+
+/// The standard error. A log that cannot be written is no reason to die, and what a service logs may come
+/// from a message: a terminal is not to obey it.
+struct Log;
+
+impl io::Write for Log {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let mut stderr = io::stderr();
+        let _ = if stderr.is_terminal() {
+            let text = String::from_utf8_lossy(bytes);
+            text.split_inclusive('\n').try_for_each(|line| {
+                let (line, end) = line.strip_suffix('\n').map_or((line, ""), |line| (line, "\n"));
+                write!(stderr, "{}{end}", terminal::harmless(line))
+            })
+        } else {
+            stderr.write_all(bytes)
+        };
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 fn command(about: About) -> Command {
@@ -144,7 +181,7 @@ fn describe(
         parameters: schema.clone(),
         defaults: defaults.clone(),
     };
-    println!("{}", serde_json::to_string(&interface)?);
+    say(&format!("{}\n", serde_json::to_string(&interface)?));
     Ok(())
 }
 
@@ -181,13 +218,12 @@ fn serve(
         times: StepTimes::default(),
         steps: 0,
         late_steps: 0,
+        unconnected: transport::unconnected(),
         health,
     };
     shared.computes.set(shared.lockstep && arguments.get_one::<u64>("compute-ns").is_some_and(|&ns| ns > 0));
     for &(topic, _) in &service.wakes {
-        if let Some(entry) = shared.switchboard.topic(topic) {
-            entry.set_wake(shared.slot, true);
-        }
+        shared.keep_awake(topic);
     }
     // Those who publish what we read serve us the last message.
     shared.switchboard.announce_reader();
@@ -221,7 +257,7 @@ fn open_health(joined: &mut Joined, role: &str) -> Result<Option<PublisherLink>,
         return Ok(None);
     }
     let fingerprint = Health::description().fingerprint();
-    Ok(Some(joined.open_publisher(&topic, fingerprint, size_of::<Health>())?))
+    Ok(Some(joined.open_publisher(&topic, fingerprint, false)?))
 }
 
 struct Service {
@@ -237,6 +273,8 @@ struct Service {
     times: StepTimes,
     steps: u64,
     late_steps: u64,
+    /// Ports that could not be connected, as of the last look.
+    unconnected: u64,
     health: Option<PublisherLink>,
 }
 
@@ -252,7 +290,9 @@ impl Service {
             let heard = slot.bell();
             let now = clock::monotonic();
             slot.heartbeat_ns.store(now.as_nanos(), Ordering::Relaxed);
+            self.hold_place(slot);
             self.serve_new_readers();
+            self.say_unconnected();
             let woken = self.look_for_messages();
             let timer = now >= due;
             if woken || timer {
@@ -291,6 +331,7 @@ impl Service {
             let heard = slot.bell();
             let given = slot.turn.load(Ordering::Acquire);
             if given == turn {
+                self.hold_place(slot);
                 self.serve_new_readers();
                 slot.wait(heard, Some(HEARTBEAT));
                 continue;
@@ -316,6 +357,15 @@ impl Service {
         }
         // A step that was not computed to its end has published nothing, and its ports must close.
         shared.held.borrow_mut().clear();
+    }
+
+    /// Writes again what is this process's own on the board's page, should a broken process have written over
+    /// it: its place, and what wakes it.
+    fn hold_place(&self, slot: &Slot) {
+        slot.hold();
+        for &(topic, _) in &self.wakes {
+            self.shared.keep_awake(topic);
+        }
     }
 
     fn set_timer(&self, slot: &Slot, now: Time) {
@@ -396,6 +446,19 @@ impl Service {
         }
     }
 
+    /// A reader or a publisher came that this process could not connect to: one of the two hears nothing of
+    /// the other.
+    fn say_unconnected(&mut self) {
+        let unconnected = transport::unconnected();
+        if unconnected != self.unconnected {
+            self.unconnected = unconnected;
+            // Without a lack it died in the making.
+            if let Some(lack) = Lack::look() {
+                tracing::error!("another process of the board cannot be connected to: {lack}");
+            }
+        }
+    }
+
     fn publish_health(&mut self, now: Time) {
         let Some(link) = &self.health else { return };
         let health = Health {
@@ -466,7 +529,7 @@ fn apply_scheduling(arguments: &ArgMatches) -> Result<(), SetupError> {
         let parameter = libc::sched_param { sched_priority: priority };
         // SAFETY: a plain system call on a valid struct.
         if unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameter) } != 0 {
-            let error = std::io::Error::last_os_error();
+            let error = io::Error::last_os_error();
             return Err(
                 format!("--fifo {priority}: {error}; it needs CAP_SYS_NICE or an rtprio limit").into()
             );
@@ -480,7 +543,8 @@ fn start_logging() {
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info"));
     let _ = tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(std::io::stderr)
+        .with_writer(|| Log)
+        .log_internal_errors(false)
         .with_target(false)
         .with_ansi(false)
         .with_timer(tracing_subscriber::fmt::time::uptime())

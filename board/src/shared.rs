@@ -3,12 +3,16 @@
 use crate::clock;
 use crate::port::Held;
 use crate::switchboard::{Slot, Switchboard};
+use crate::transport::TransportError;
 use messages::Time;
 use std::cell::{Cell, RefCell};
 use std::sync::atomic::Ordering;
 
 /// How far a stamp may lie ahead of the last look at the clock.
 const FUTURE: std::time::Duration = std::time::Duration::from_millis(5);
+
+/// How often messages that cannot be sent are spoken of.
+const COMPLAINT: std::time::Duration = std::time::Duration::from_secs(1);
 
 /// The state behind all ports of a node. Ports stay in their thread.
 pub(crate) struct Shared {
@@ -30,6 +34,9 @@ pub(crate) struct Shared {
     pub(crate) lost: Cell<u64>,
     pub(crate) invalid: Cell<u64>,
     pub(crate) oldest_input_ns: Cell<u64>,
+    /// Messages that could not be sent since the last time this was said, and when it was.
+    unsent: Cell<u64>,
+    complained: Cell<Option<Time>>,
 }
 
 impl Shared {
@@ -49,11 +56,40 @@ impl Shared {
             lost: Cell::new(0),
             invalid: Cell::new(0),
             oldest_input_ns: Cell::new(0),
+            unsent: Cell::new(0),
+            complained: Cell::new(None),
         }
     }
 
     pub(crate) fn own_slot(&self) -> Option<&Slot> {
         self.switchboard.slot(self.slot)
+    }
+
+    /// A message was read that is not what it says.
+    pub(crate) fn count_invalid(&self) {
+        self.invalid.set(self.invalid.get().saturating_add(1));
+    }
+
+    /// A message could not be sent: it is counted, and said at most once a second, since the next one will
+    /// fare no better.
+    #[cold]
+    pub(crate) fn lose(&self, topic: &str, error: &TransportError) {
+        self.lost.set(self.lost.get().saturating_add(1));
+        self.unsent.set(self.unsent.get() + 1);
+        let now = clock::monotonic();
+        if self.complained.get().is_none_or(|last| now.since(last) >= COMPLAINT) {
+            self.complained.set(Some(now));
+            tracing::error!(topic, messages = self.unsent.take(), %error, "message lost");
+        }
+    }
+
+    /// Messages of this topic wake this process.
+    pub(crate) fn keep_awake(&self, topic: u32) {
+        if let Some(entry) = self.switchboard.topic(topic)
+            && !entry.wakes(self.slot)
+        {
+            entry.set_wake(self.slot, true);
+        }
     }
 
     pub(crate) fn begin_step(&self, now: Time, round: u32) {

@@ -6,12 +6,12 @@
 //! atomic, and every index read from it is checked: a process that writes nonsense into it can disturb the board, but not the
 //! memory safety of the others.
 
+use crate::private;
 use messages::Time;
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 use rustix::thread::futex;
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io;
-use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::Path;
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
@@ -20,7 +20,10 @@ use std::time::Duration;
 pub const SLOTS: usize = 128;
 /// Topics on one board at the most.
 pub const TOPICS: usize = 256;
-const MAGIC: u64 = 0x6b72_6f63_0000_0006;
+const MAGIC: u64 = 0x6b72_6f63_0000_0007;
+/// How far a moment on the page may lie ahead of the clock of who reads it, which was looked at a little
+/// before.
+const AHEAD: Duration = Duration::from_millis(100);
 const ROLE_BYTES: usize = 48;
 /// Stands for no slot.
 pub const NO_SLOT: u32 = u32::MAX;
@@ -137,6 +140,9 @@ struct Page {
     topics: [TopicEntry; TOPICS],
 }
 
+/// Bytes of the page.
+pub(crate) const PAGE_BYTES: usize = size_of::<Page>();
+
 /// The mapped page.
 pub struct Switchboard {
     page: *const Page,
@@ -159,10 +165,12 @@ impl Switchboard {
     /// # Errors
     /// When the file exists or cannot be mapped.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let file = OpenOptions::new().read(true).write(true).create_new(true).mode(0o600).open(path)?;
+        let file = private::create(path)?;
         // Reserved, not only sized: with shared memory full, this fails, and not the first write into the page (SIGBUS).
-        rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, size_of::<Page>() as u64)?;
-        let board = Self::map(&file)?;
+        rustix::fs::fallocate(&file, rustix::fs::FallocateFlags::empty(), 0, PAGE_BYTES as u64)
+            .map_err(io::Error::from)
+            .map_err(private::at(path))?;
+        let board = Self::map(&file).map_err(private::at(path))?;
         for topic in 0..TOPICS {
             board.page().topics[topic].publisher.store(NO_SLOT, Ordering::Relaxed);
         }
@@ -176,21 +184,22 @@ impl Switchboard {
     /// # Errors
     /// When there is none, or it was made by another version.
     pub fn open(path: &Path) -> io::Result<Self> {
-        let file = OpenOptions::new().read(true).write(true).open(path)?;
-        if file.metadata()?.len() != size_of::<Page>() as u64 {
-            return Err(io::Error::new(
-                io::ErrorKind::InvalidData,
-                "the board was made by another version of Corkboard",
-            ));
+        let unfit =
+            |why: &str| io::Error::new(io::ErrorKind::InvalidData, format!("{}: {why}", path.display()));
+        let file = private::open(path)?;
+        if file.metadata().map_err(private::at(path))?.len() != PAGE_BYTES as u64 {
+            return Err(unfit("the board was made by another version of Corkboard"));
         }
-        let board = Self::map(&file)?;
+        let board = Self::map(&file).map_err(private::at(path))?;
         if board.page().header.magic.load(Ordering::Acquire) != MAGIC {
-            return Err(io::Error::new(
-                io::ErrorKind::InvalidData,
-                "the board was made by another version of Corkboard",
-            ));
+            return Err(unfit("the page is damaged, or the board was made by another version of Corkboard"));
         }
         Ok(board)
+    }
+
+    /// Writes the mark of a page again, in which its version stands; whether it was another.
+    pub(crate) fn restore_mark(&self) -> bool {
+        self.page().header.magic.swap(MAGIC, Ordering::AcqRel) != MAGIC
     }
 
     fn map(file: &File) -> io::Result<Self> {
@@ -253,10 +262,12 @@ impl Switchboard {
         })
     }
 
-    /// Gives a slot back.
+    /// Gives back a slot that this process has claimed. One that another living process has claimed since,
+    /// because the page said that it was free, stays as it is.
     pub fn release(&self, index: u32) {
-        self.silence(index);
-        if let Some(slot) = self.slot(index) {
+        let is_ours = |slot: &&Slot| slot.owner() == std::process::id() || !slot.is_held();
+        if let Some(slot) = self.slot(index).filter(is_ours) {
+            self.silence(index);
             slot.pid.store(0, Ordering::Relaxed);
             slot.state.store(SlotState::Free as u32, Ordering::Release);
             slot.owner.store(0, Ordering::Release);
@@ -283,6 +294,11 @@ impl Switchboard {
         for topic in &self.page().topics {
             topic.set_wake(index, false);
         }
+    }
+
+    /// Whether any topic wakes the process in this slot.
+    pub(crate) fn is_woken(&self, index: u32) -> bool {
+        self.page().topics.iter().any(|topic| topic.wakes(index))
     }
 
     /// Rings the bell of everybody who asked to be woken by this topic.
@@ -351,6 +367,48 @@ impl Slot {
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
+    fn owner(&self) -> u32 {
+        self.owner.load(Ordering::Acquire)
+    }
+
+    /// Whether a living process has claimed it.
+    pub(crate) fn is_held(&self) -> bool {
+        let owner = self.owner();
+        owner != 0 && process_lives(owner)
+    }
+
+    /// Writes again that this process has claimed the slot for a service of this role; whether anything else
+    /// stood there.
+    pub(crate) fn restore_claim(&self, role: &str) -> bool {
+        let mut differs = self.owner.swap(std::process::id(), Ordering::AcqRel) != std::process::id();
+        differs |= self.is_service.swap(1, Ordering::AcqRel) != 1;
+        if self.role() != kept_of(role) {
+            self.set_role(role);
+            differs = true;
+        }
+        differs
+    }
+
+    /// Keeps a place that is this process's own: what a broken process has written into it could make others
+    /// take it for dead, or give the place away.
+    pub(crate) fn hold(&self) {
+        let pid = std::process::id();
+        if self.pid.load(Ordering::Relaxed) != pid {
+            self.pid.store(pid, Ordering::Release);
+        }
+        if self.state() != SlotState::Running {
+            self.set_state(SlotState::Running);
+        }
+    }
+
+    /// Keeps a place that this process has claimed for itself.
+    pub(crate) fn hold_claim(&self) {
+        if self.owner() != std::process::id() && !self.is_held() {
+            self.owner.store(std::process::id(), Ordering::Release);
+        }
+        self.hold();
+    }
+
     fn set_role(&self, role: &str) {
         for (index, byte) in self.role.iter().enumerate() {
             byte.store(role.as_bytes().get(index).copied().unwrap_or(0), Ordering::Relaxed);
@@ -386,9 +444,25 @@ impl Slot {
         wait(&self.bell, &self.sleeps, heard, timeout);
     }
 
-    /// The moment of its last heartbeat.
-    pub fn heartbeat(&self) -> Time {
-        Time::from_nanos(self.heartbeat_ns.load(Ordering::Relaxed))
+    /// How long ago the process last looked about. `None` when nothing can be said: it has not yet, or the
+    /// page says nonsense, which a living process writes over at its next look.
+    pub fn silence(&self, now: Time) -> Option<Duration> {
+        since(&self.heartbeat_ns, now)
+    }
+
+    /// How long its present step has lasted; `None` between steps, and when the page says nonsense.
+    pub fn in_step(&self, now: Time) -> Option<Duration> {
+        since(&self.step_since_ns, now)
+    }
+
+    /// Lets the silence of a running process count from now where nothing can be said of it; whether the page
+    /// said nonsense.
+    pub(crate) fn restore_heartbeat(&self, now: Time, lockstep: bool) -> bool {
+        // In lockstep nobody looks about between its turns.
+        if lockstep || self.state() != SlotState::Running || self.silence(now).is_some() {
+            return false;
+        }
+        self.heartbeat_ns.swap(now.as_nanos(), Ordering::Relaxed) != 0
     }
 }
 
@@ -411,6 +485,17 @@ impl TopicEntry {
             .get(slot as usize / 64)
             .is_some_and(|word| word.load(Ordering::Acquire) & (1 << (slot % 64)) != 0)
     }
+}
+
+/// The time since a moment on the page; `None` when it is none.
+fn since(moment_ns: &AtomicU64, now: Time) -> Option<Duration> {
+    let moment = Time::from_nanos(moment_ns.load(Ordering::Relaxed));
+    (moment != Time::ZERO && moment <= now.after(AHEAD)).then(|| now.since(moment))
+}
+
+/// As much of a role's name as a slot keeps.
+fn kept_of(role: &str) -> String {
+    String::from_utf8_lossy(&role.as_bytes()[..role.len().min(ROLE_BYTES)]).into_owned()
 }
 
 /// Counts up `bell` and wakes one sleeper. Sequentially consistent on both sides: either the ringer sees the sleeper, or the kernel sees the

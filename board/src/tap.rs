@@ -6,10 +6,12 @@ use crate::manifest::{Manifest, Topic};
 use crate::node::{JoinError, Joined};
 use crate::place::Place;
 use crate::port::{PublisherLink, ReaderLink};
+use crate::private::Version;
 use crate::switchboard::{SlotState, Switchboard};
 use crate::transport::{Envelope, RawMessage, TransportError};
 use messages::Time;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
+use std::ops::Range;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -19,6 +21,10 @@ pub use crate::port::OUTSIDE_ROUND;
 pub struct Tap {
     joined: Joined,
     topology: Cell<u32>,
+    /// The topics that wake it.
+    wakes: RefCell<Vec<u32>>,
+    /// The table of contents, as it was last read.
+    manifest_file: Option<Version>,
 }
 
 impl std::fmt::Debug for Tap {
@@ -33,14 +39,39 @@ impl Tap {
     /// # Errors
     /// When it is not, or all its places are taken.
     pub fn join(place: Place, tool: &str) -> Result<Self, JoinError> {
-        if crate::host::living_launcher(&place).is_none() {
-            return Err(JoinError::NoBoard { board: place.name().to_owned() });
+        let board = || place.name().to_owned();
+        match crate::host::living_launcher(&place) {
+            Ok(Some(_)) => {}
+            Ok(None) => return Err(JoinError::NoBoard { board: board() }),
+            Err(source) => return Err(JoinError::Unreadable { board: board(), source }),
         }
+        let manifest_file = Manifest::version(&place);
         let joined = Joined::join(place, tool, None)?;
         if let Some(slot) = joined.shared.own_slot() {
             slot.set_state(SlotState::Running);
         }
-        Ok(Self { joined, topology: Cell::new(0) })
+        Ok(Self { joined, topology: Cell::new(0), wakes: RefCell::default(), manifest_file })
+    }
+
+    /// Reads the table of contents again if it has changed; the places in it of the topics that are new.
+    /// Those that were there stay where they were. Costs one look at a file while nothing changes.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn refresh(&mut self) -> Result<Range<usize>, JoinError> {
+        let known = self.joined.manifest.topics.len();
+        let file = Manifest::version(&self.joined.place);
+        // While the board is being taken down there is none.
+        if file.is_some() && file != self.manifest_file {
+            let board = || self.joined.place.name().to_owned();
+            let manifest = Manifest::read(&self.joined.place)
+                .map_err(|source| JoinError::Unreadable { board: board(), source })?;
+            self.manifest_file = file;
+            if manifest.topics.len() > known {
+                self.joined.manifest = manifest;
+            }
+        }
+        Ok(known..self.joined.manifest.topics.len())
     }
 
     /// The board's table of contents.
@@ -60,9 +91,8 @@ impl Tap {
     pub fn reader(&self, topic: &str) -> Result<TapReader, JoinError> {
         let (index, entry) = self.topic(topic)?;
         let link = self.joined.open_reader(topic, entry.message.fingerprint(), entry.depth)?;
-        if let Some(entry) = self.switchboard().topic(index) {
-            entry.set_wake(self.joined.shared.slot, true);
-        }
+        self.joined.shared.keep_awake(index);
+        self.wakes.borrow_mut().push(index);
         self.switchboard().announce_reader();
         Ok(TapReader { link, held: None })
     }
@@ -73,7 +103,7 @@ impl Tap {
     /// When there is no such topic, or it takes no more publishers.
     pub fn publisher(&mut self, topic: &str) -> Result<TapPublisher, JoinError> {
         let fingerprint = self.topic(topic)?.1.message.fingerprint();
-        Ok(TapPublisher { link: self.joined.open_publisher(topic, fingerprint, 4096)? })
+        Ok(TapPublisher { link: self.joined.open_publisher(topic, fingerprint, true)? })
     }
 
     /// Sleeps until a topic that is read has a new message, at most for `timeout`. Look for messages first: `heard` is the bell before the look.
@@ -81,6 +111,8 @@ impl Tap {
     pub fn wait(&self, heard: u32, timeout: Duration) {
         self.serve_new_readers();
         if let Some(slot) = self.joined.shared.own_slot() {
+            slot.hold_claim();
+            self.wakes.borrow().iter().for_each(|&topic| self.joined.shared.keep_awake(topic));
             slot.heartbeat_ns.store(clock::monotonic().as_nanos(), Ordering::Relaxed);
             slot.wait(heard, Some(timeout));
         }
@@ -130,15 +162,20 @@ impl TapReader {
     #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self) -> Option<(Envelope, &[u8])> {
         // A tool sees everything that is there, in lockstep too.
-        let message = self.link.reader.receive()?;
+        let message = self.link.receive()?;
         let envelope = *message.envelope();
         self.link.count_gap(envelope.sequence);
         Some((envelope, self.held.insert(message).bytes()))
     }
 
-    /// Messages that were overwritten before they were read.
+    /// Messages that were overwritten before they were read, on any topic of this reader's tap.
     pub fn lost(&self) -> u64 {
         self.link.shared.lost.get()
+    }
+
+    /// Messages that were not what they said, on any topic of this reader's tap.
+    pub fn invalid(&self) -> u64 {
+        self.link.shared.invalid.get()
     }
 }
 

@@ -19,7 +19,8 @@ fn name() -> String {
 
 fn manifest() -> Manifest {
     let message = WheelSpeeds::description();
-    let topic = Topic { name: "wheels".into(), publisher: None, readers: vec![], depth: 8, message };
+    let topic =
+        Topic { name: "wheels".into(), publisher: None, readers: vec![], depth: 8, elements: 0, message };
     Manifest { graph: "test".into(), topics: vec![topic], ..Manifest::default() }
 }
 

@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::graph::{Overrides, Request};
+use board::arguments::positive;
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -527,14 +528,6 @@ pub(crate) struct OrderArgs {
     /// The board.
     #[command(flatten)]
     pub(crate) running: Running,
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if number.is_finite() && number > 0.0 => Ok(number),
-        Ok(number) => Err(format!("{number} is not above zero")),
-        Err(error) => Err(error.to_string()),
-    }
 }
 
 /// Prints the completions of the command line.

@@ -1,7 +1,7 @@
 //! What the other commands do beside a running graph.
 
 use crate::cli::{AttachArgs, LastArgs, LogsArgs, OrderArgs, RestartArgs, StatusArgs, StopArgs};
-use crate::console::{harmless, say, say_line, warn};
+use crate::console::{say, say_line, warn};
 use crate::control::{self, Answer, Request, Status};
 use crate::journal;
 use crate::order;
@@ -10,6 +10,7 @@ use crate::view::{self, OnQuit};
 use board::clock;
 use board::host;
 use board::place::Place;
+use board::terminal::harmless;
 use comfy_table::{Cell, CellAlignment, Table, presets};
 use rustix::process::{Pid, Signal, kill_process};
 use std::collections::BTreeMap;
@@ -67,9 +68,7 @@ pub(crate) fn attach(args: &AttachArgs) -> Outcome {
     if !args.json && !args.plain && view::can_show() {
         let ended = view::watch(&place, &OnQuit::Leave, &AtomicBool::new(false));
         match ended {
-            Some(_) if host::living_launcher(&place).is_none() => {
-                say_line(&format!("the board `{name}` is down"))
-            }
+            Some(_) if !control::is_up(&place)? => say_line(&format!("the board `{name}` is down")),
             Some(why) => return Err(why),
             None => say_line(&format!("the robot goes on; `launch stop --board {name}` stops it")),
         }
@@ -96,7 +95,7 @@ pub(crate) fn attach(args: &AttachArgs) -> Outcome {
                     events.collect::<String>()
                 ));
             }
-            Err(_) if host::living_launcher(&place).is_none() => {
+            Err(_) if !control::is_up(&place)? => {
                 say_line(&format!("the board `{name}` is down"));
                 return Ok(());
             }
@@ -144,7 +143,7 @@ pub(crate) fn logs(args: &LogsArgs) -> Outcome {
         ));
     }
     let Some(place) = logs.place.filter(|_| args.follow) else { return Ok(()) };
-    while host::living_launcher(&place).is_some() {
+    while control::is_up(&place)? {
         for role in &roles {
             let from = positions.entry(role.clone()).or_default();
             let more = read_from(&journal::log_file(&logs.folder, role), from);
@@ -160,7 +159,7 @@ fn find_logs(args: &LogsArgs) -> Result<Logs, String> {
     let board = args.running.board.as_deref();
     if !args.last {
         sweep(board)?;
-        let running = control::running();
+        let running = host::boards_up().map_err(|error| error.to_string())?;
         let is_up = board.is_none_or(|board| running.iter().any(|place| place.name() == board));
         if is_up && !running.is_empty() {
             let place = choose(board)?;
@@ -240,10 +239,11 @@ pub(crate) fn stop(args: &StopArgs) -> Outcome {
     sweep(args.running.board.as_deref())?;
     let place = choose(args.running.board.as_deref())?;
     let name = place.name().to_owned();
-    let Some(pid) = host::living_launcher(&place) else { return Ok(()) };
+    let launcher = || host::living_launcher(&place).map_err(|error| error.to_string());
+    let Some(pid) = launcher()? else { return Ok(()) };
     let send = |signal| {
         // Only to the launcher that holds the board, which may have gone meanwhile.
-        if host::living_launcher(&place) == Some(pid)
+        if launcher() == Ok(Some(pid))
             && let Some(process) = i32::try_from(pid).ok().and_then(Pid::from_raw)
         {
             let _ = kill_process(process, signal);
@@ -263,7 +263,7 @@ pub(crate) fn stop(args: &StopArgs) -> Outcome {
     }
     let began = clock::monotonic();
     let mut hurried = false;
-    while host::living_launcher(&place).is_some() {
+    while control::is_up(&place)? {
         let waited = clock::monotonic().since(began);
         if waited > STOPS_WITHIN {
             warn(&format!(
@@ -281,7 +281,7 @@ pub(crate) fn stop(args: &StopArgs) -> Outcome {
     }
     // If it was killed while it stopped, something is left.
     sweep(Some(&name))?;
-    if host::living_launcher(&place).is_some() {
+    if control::is_up(&place)? {
         return Err(format!("the board `{name}` does not come down: process {pid} cannot be killed"));
     }
     say_line(&format!("the board `{name}` is down"));
@@ -299,7 +299,7 @@ pub(crate) fn order(args: &OrderArgs) -> Outcome {
 /// The board that is meant; where none is up, with what became of the last one.
 fn choose(board: Option<&str>) -> Result<Place, String> {
     control::choose(board).map_err(|error| match runs::newest(board).map(|(_, run)| run) {
-        Some(run) if control::running().is_empty() => {
+        Some(run) if host::boards_up().is_ok_and(|boards| boards.is_empty()) => {
             let end = run.end.map_or("its launcher was killed".to_owned(), |end| harmless(&end.why));
             format!("{error} (the last run, of `{}`: {end}; `launch last`)", run.board)
         }

@@ -162,26 +162,6 @@ fn give_up(error: &io::Error) -> ! {
     std::process::exit(1);
 }
 
-/// Text that came from elsewhere (a message, a log, a file's name), fit for a terminal: control characters are written as what they are, so that none of them
-/// moves the cursor, changes colours or a title, or types something.
-pub(crate) fn harmless(text: &str) -> String {
-    let mut harmless = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '\t' => harmless.push(letter),
-            // Besides the control characters those that turn the direction of writing, by which a line can be made to read as another.
-            letter
-                if letter.is_control()
-                    || matches!(letter, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}') =>
-            {
-                harmless.extend(letter.escape_unicode());
-            }
-            letter => harmless.push(letter),
-        }
-    }
-    harmless
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -267,20 +247,5 @@ mod tests {
         console.error("two");
         console.flush();
         assert_eq!(errors.text(), "two\n");
-    }
-
-    #[track_caller]
-    fn check(text: &str, expected: &str) {
-        assert_eq!(harmless(text), expected);
-    }
-
-    #[test]
-    fn control_characters_are_shown_and_not_obeyed() {
-        check("to 207, 1.5 m", "to 207, 1.5 m");
-        check("Büro 7 → 8", "Büro 7 → 8");
-        check("\u{1b}]0;owned\u{7}", "\\u{1b}]0;owned\\u{7}");
-        check("207\n208\r", "207\\u{a}208\\u{d}");
-        check("\u{9b}31m", "\\u{9b}31m");
-        check("a\u{202e}b", "a\\u{202e}b");
     }
 }

@@ -8,7 +8,7 @@ pub(crate) use ear::Ear;
 use crate::graph::{Overrides, ViewSettings};
 use crate::supervise::{Event, Phase, SwapRequest, SwapState};
 use board::host;
-use board::place::{self, Place};
+use board::place::Place;
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufRead as _, BufReader, Write as _};
 use std::os::unix::net::UnixStream;
@@ -260,7 +260,11 @@ fn converse(place: &Place, request: &Request, limit: Duration) -> io::Result<Str
 /// Why there is no answer, in words for the operator.
 fn no_answer(place: &Place, error: &io::Error) -> String {
     let board = place.name();
-    let Some(pid) = host::living_launcher(place) else { return format!("the board `{board}` is down") };
+    let pid = match host::living_launcher(place) {
+        Ok(Some(pid)) => pid,
+        Ok(None) => return format!("the board `{board}` is down"),
+        Err(error) => return error.to_string(),
+    };
     if is_suspended(pid) {
         return format!(
             "the launcher of `{board}` (process {pid}) is suspended; `kill -CONT {pid}` lets it go on, `launch stop` ends the robot"
@@ -282,9 +286,12 @@ pub(crate) fn is_suspended(pid: u32) -> bool {
     matches!(state, Some('T' | 't'))
 }
 
-/// The boards that are up.
-pub(crate) fn running() -> Vec<Place> {
-    place::places().into_iter().filter(|place| host::living_launcher(place).is_some()).collect()
+/// Whether the launcher of a board lives.
+///
+/// # Errors
+/// When that cannot be told.
+pub(crate) fn is_up(place: &Place) -> Result<bool, String> {
+    host::living_launcher(place).map(|launcher| launcher.is_some()).map_err(|error| error.to_string())
 }
 
 /// The board that is meant: the one named, or the only one that is up.
@@ -292,7 +299,7 @@ pub(crate) fn running() -> Vec<Place> {
 /// # Errors
 /// When it is not up, or the choice is not clear.
 pub(crate) fn choose(name: Option<&str>) -> Result<Place, String> {
-    let mut running = running();
+    let mut running = host::boards_up().map_err(|error| error.to_string())?;
     let names = || running.iter().map(|place| format!("`{}`", place.name())).collect::<Vec<_>>().join(", ");
     match name {
         Some(name) => match running.iter().position(|place| place.name() == name) {

@@ -23,7 +23,7 @@ const LOOK: Duration = Duration::from_millis(20);
 /// With the launcher's words, when the graph does not come up.
 pub(crate) fn detach(board: &str) -> Result<(), String> {
     let place = Place::new(board).map_err(|error| error.to_string())?;
-    if let Some(pid) = host::living_launcher(&place) {
+    if let Some(pid) = host::living_launcher(&place).map_err(|error| error.to_string())? {
         return Err(format!(
             "the board `{board}` is up already (launcher {pid}); stop it with `launch stop --board {board}`"
         ));

@@ -1,9 +1,9 @@
 //! `launch order`: something is wanted of the robot, and whether it will do it.
 
-use crate::console::harmless;
 use board::clock;
 use board::place::Place;
 use board::tap::{Tap, TapReader};
+use board::terminal::harmless;
 use messages::{Order, OrderReport, OrderStateName, View};
 use std::hash::{BuildHasher as _, RandomState};
 use std::time::Duration;

@@ -1,7 +1,8 @@
 //! The run as lines, for pipes and logs.
 
-use crate::console::{Console, harmless};
+use crate::console::Console;
 use crate::supervise::Supervisor;
+use board::terminal::harmless;
 use messages::RunSummary;
 
 /// Prints a line an event.

@@ -166,7 +166,7 @@ fn compare_until_the_end(args: &SwapArgs, place: &Place, role: &str) -> Result<(
         }
         let now = clock::monotonic();
         let over = args.length_s.is_some_and(|length_s| now.seconds_since(began) >= length_s);
-        let down = board::host::living_launcher(place).is_none();
+        let down = !control::is_up(place)?;
         if over || down || signals.count() > 0 {
             break;
         }

@@ -6,13 +6,13 @@ mod pulse;
 mod strays;
 mod swap;
 
-use crate::console::harmless;
 use crate::graph::{Checked, CheckedService, CheckedTopic, Overrides};
 use crate::journal::{self, Journal};
 use crate::runs::RunFolder;
 use board::host::{self, Host, HostError};
 use board::manifest::{Manifest, Topic};
 use board::switchboard::SlotState;
+use board::terminal::harmless;
 use board::{EXIT_SETUP, clock};
 use cleaner::Cleaner;
 use messages::{Health, Message as _, Time};
@@ -295,6 +295,19 @@ impl Supervisor {
             self.note("", text.clone(), true);
             self.lost = Some(text);
         }
+        if self.lost.is_some() {
+            return;
+        }
+        for damage in self.host.repair(&self.living()) {
+            self.note("", damage, true);
+        }
+    }
+
+    /// The places of the services that live, newcomers included, with their processes.
+    fn living(&self) -> Vec<(u32, u32)> {
+        let playing = self.services.iter().filter_map(|service| service.process.as_ref());
+        let newcomers = self.services.iter().filter_map(Supervised::newcomer_process);
+        playing.chain(newcomers).map(|process| (process.slot, process.pid())).collect()
     }
 
     /// Ends a service and starts it again; `false` when there is none of that name.
@@ -603,7 +616,7 @@ impl Supervisor {
         let is_joining = process.ready.is_none();
         let limit = if is_joining { START_LIMIT } else { service.service.launch.hang_after };
         let pid = process.pid();
-        let silence = service.pulse.look(now, slot.heartbeat().as_nanos(), || vitals(pid));
+        let silence = service.pulse.look(now, slot.heartbeat_ns.load(Ordering::Relaxed), || vitals(pid));
         let role = service.service.role.clone();
         if silence.own > limit && service.said != Some(pid) {
             process.signal(Signal::KILL);
@@ -691,6 +704,7 @@ fn topic_of(topic: &CheckedTopic) -> Topic {
         publisher: topic.publisher.role().map(str::to_owned),
         readers: topic.readers.iter().map(|reader| reader.role.clone()).collect(),
         depth: topic.depth,
+        elements: topic.elements,
         message: topic.message.clone(),
     }
 }
@@ -701,6 +715,7 @@ fn health_of(role: &str) -> Topic {
         publisher: Some(role.to_owned()),
         readers: Vec::new(),
         depth: 4,
+        elements: 0,
         message: Health::description(),
     }
 }

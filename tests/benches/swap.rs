@@ -31,7 +31,9 @@ fn main() {
         let end = Arc::clone(&ending);
         // Beside the swaps, so that no message is overwritten before it is read.
         let watch = std::thread::spawn(move || watch(place, &end));
-        while done < SWAPS && board::host::living_launcher(graph.place()).is_some() {
+        while done < SWAPS
+            && board::host::living_launcher(graph.place()).is_ok_and(|launcher| launcher.is_some())
+        {
             let (role, binary) = SWAPPED[done % SWAPPED.len()];
             let Some(swap) = graph.try_swap(role, binary) else { break };
             hand_over_gaps_ms.extend(swap["done"]["gap_ms"].as_f64());

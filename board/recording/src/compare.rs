@@ -2,7 +2,7 @@
 
 use crate::{Envelope, Message, Recording, RecordingError, Topic};
 use blake3::Hasher;
-use messages::{Description, Kind, elements_offset};
+use messages::{Description, Kind, Time, elements_offset};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -74,6 +74,24 @@ impl Recording {
             digester.add(message.topic, &message.envelope, message.bytes());
         }
         Ok(digester.digest())
+    }
+}
+
+impl Recording {
+    /// How far a recording goes that was cut: the latest stamp in it, zero when it has no message; `None` for
+    /// one that is complete.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn cut_at(&self) -> Result<Option<Time>, RecordingError> {
+        if self.is_complete() {
+            return Ok(None);
+        }
+        let mut last_ns = 0;
+        for message in self.as_recorded(|_| true) {
+            last_ns = last_ns.max(message?.envelope.stamp_ns);
+        }
+        Ok(Some(Time::from_nanos(last_ns)))
     }
 }
 

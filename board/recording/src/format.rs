@@ -1,6 +1,8 @@
 //! What a recording holds beyond plain MCAP. Tools that do not know it skip it, as the MCAP specification asks of them.
 //!
-//! - Metadata `corkboard`, at the beginning of the file: `manifest` (JSON of [`crate::Manifest`]) and `version`.
+//! - Metadata `corkboard`, at the beginning of the file: `manifest` (JSON of [`crate::Manifest`]) and
+//!   `version`. It comes again, longer, when
+//!   topics are added; the last one counts.
 //! - Metadata `corkboard/end`, at the end: notes that were not known at the beginning.
 //! - A message's `log_time` is its stamp, `publish_time` its origin, `sequence` the low 32 bits of its sequence. A private record [`CONTEXT`]
 //!   in the chunk says the rest for the messages of one channel that follow it in that chunk: it is written when it changes, which is seldom, so

@@ -135,6 +135,22 @@ pub enum RecordingError {
         /// Its bytes.
         bytes: usize,
     },
+    /// The recording could not go on.
+    #[error(
+        "{}: {cause}; the recording ends here, and its first {messages} messages ({bytes} bytes of file) are kept",
+        path.display()
+    )]
+    Cut {
+        /// The recording.
+        path: PathBuf,
+        /// Messages that are in the file.
+        messages: u64,
+        /// Bytes of the file.
+        bytes: u64,
+        /// Why.
+        #[source]
+        cause: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// A topic number that is not in the manifest.
     #[error("{}: there is no topic {index}; the recording has {topics}", path.display())]
     NoTopic {
@@ -171,12 +187,13 @@ impl RecordingError {
 }
 
 fn codecs(path: &Path, manifest: &Manifest) -> Result<Vec<Codec>, RecordingError> {
-    let codec = |topic: &Topic| {
-        Codec::new(&topic.message).map_err(|cause| RecordingError::Description {
-            path: path.to_owned(),
-            topic: topic.name.clone(),
-            cause,
-        })
-    };
-    manifest.topics.iter().map(codec).collect()
+    manifest.topics.iter().map(|topic| codec(path, topic)).collect()
+}
+
+fn codec(path: &Path, topic: &Topic) -> Result<Codec, RecordingError> {
+    Codec::new(&topic.message).map_err(|cause| RecordingError::Description {
+        path: path.to_owned(),
+        topic: topic.name.clone(),
+        cause,
+    })
 }

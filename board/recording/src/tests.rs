@@ -228,6 +228,52 @@ fn a_recorder_that_is_never_finished_has_written_its_closed_chunks() {
 }
 
 #[test]
+fn a_topic_that_is_added_is_recorded_from_then_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("test.mcap");
+    let all = manifest(catalogue().into_iter().take(3).collect());
+    let first = Manifest { topics: all.topics[..1].to_vec(), ..all.clone() };
+    let mut recorder = Recorder::new(&path, &first).unwrap();
+    let message = |topic: usize, sequence| {
+        let bytes = random_message(&all.topics[topic].message, sequence, 2);
+        (topic, envelope(sequence * 10, sequence), bytes)
+    };
+    let messages = [message(0, 1), message(1, 2), message(0, 3), message(2, 4), message(1, 5)];
+    let (mut known, mut lengths) = (1, Vec::new());
+    for (topic, envelope, bytes) in &messages {
+        while known <= *topic {
+            assert_eq!(recorder.add_topic(&all.topics[known]).unwrap(), known);
+            known += 1;
+        }
+        recorder.record(*topic, envelope, bytes).unwrap();
+        recorder.flush().unwrap();
+        lengths.push(recorder.file_bytes());
+    }
+    recorder.finish().unwrap();
+    let recording = Recording::open(&path).unwrap();
+    assert!(recording.is_complete());
+    assert_eq!(recording.manifest(), &all);
+    assert_eq!(read(recording.in_order(|_| true)), messages);
+    // Cut anywhere it holds what was whole until then.
+    let bytes = std::fs::read(&path).unwrap();
+    for (index, &length) in lengths.iter().enumerate() {
+        std::fs::write(&path, &bytes[..length as usize]).unwrap();
+        let recording = Recording::open(&path).unwrap();
+        assert_eq!(read(recording.as_recorded(|_| true)), messages[..=index]);
+        assert_eq!(recording.cut_at().unwrap(), Some(Time::from_nanos((index as u64 + 1) * 10)));
+    }
+}
+
+#[test]
+fn a_recording_is_its_owners() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = tempfile::tempdir().unwrap();
+    let recording = recorded(folder.path(), &manifest(vec![]), &[], 1);
+    assert_eq!(std::fs::metadata(recording.path()).unwrap().permissions().mode() & 0o777, 0o600);
+    assert_eq!(recording.cut_at().unwrap(), None);
+}
+
+#[test]
 fn many_bytes_close_a_chunk() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("large.mcap");

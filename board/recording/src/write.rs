@@ -1,13 +1,14 @@
 //! Writing a recording.
 
 use crate::format::{CONTEXT, Context, METADATA, METADATA_END, MISFIT, VERSION, write_misfit};
-use crate::{Codec, Envelope, Manifest, RecordingError, codecs};
+use crate::{Codec, Envelope, Manifest, RecordingError, Topic, codec, codecs};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::PrivateRecordOptions;
 use messages::Time;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -34,8 +35,10 @@ pub struct Counts {
 /// Whatever kills the process, the file opens up to its last closed chunk; [`Recorder::tick`] closes one at least each second.
 pub struct Recorder {
     path: PathBuf,
-    writer: mcap::Writer<BufWriter<File>>,
+    /// Gone when the recording could not go on.
+    writer: Option<mcap::Writer<BufWriter<File>>>,
     file: File,
+    manifest: Manifest,
     codecs: Vec<Codec>,
     /// What the present chunk has said of each channel.
     said: Vec<Option<Context>>,
@@ -43,6 +46,8 @@ pub struct Recorder {
     chunk_bytes: usize,
     chunk_since: Option<Time>,
     counts: Counts,
+    /// What is in the file for certain: messages, and bytes of the file.
+    kept: (u64, u64),
     notes: BTreeMap<String, String>,
 }
 
@@ -70,7 +75,9 @@ impl Recorder {
         let codecs = codecs(path, manifest)?;
         let io = || RecordingError::io(path);
         let mcap = || RecordingError::mcap(path);
-        let file = File::create_new(path).map_err(io())?;
+        // What a robot has seen is its owner's alone.
+        let mut options = File::options();
+        let file = options.read(true).write(true).create_new(true).mode(0o600).open(path).map_err(io())?;
         let writer = BufWriter::new(file.try_clone().map_err(io())?);
         let mut writer = mcap::WriteOptions::new()
             .profile("ros2")
@@ -83,28 +90,18 @@ impl Recorder {
             .disable_seeking(true)
             .create(writer)
             .map_err(mcap())?;
-        let manifest_json = serde_json::to_string(manifest).map_err(|error| io()(error.into()))?;
-        let metadata = [("manifest".to_owned(), manifest_json), ("version".to_owned(), VERSION.to_owned())];
-        writer
-            .write_metadata(&Metadata { name: METADATA.to_owned(), metadata: metadata.into() })
-            .map_err(mcap())?;
+        writer.write_metadata(&contents(manifest)).map_err(mcap())?;
         for (index, topic) in manifest.topics.iter().enumerate() {
-            let name = topic.message.ros2msg_name();
-            let text = topic.message.ros2msg();
-            let schema = writer.add_schema(&name, "ros2msg", text.as_bytes()).map_err(mcap())?;
-            let about = BTreeMap::from([
-                ("publisher".to_owned(), topic.publisher.clone().unwrap_or_default()),
-                ("fingerprint".to_owned(), format!("{:016x}", topic.message.fingerprint())),
-            ]);
-            writer
-                .add_channel_with_id(channel(index), schema, &format!("/{}", topic.name), "cdr", &about)
-                .map_err(mcap())?;
+            add_channel(&mut writer, index, topic).map_err(mcap())?;
         }
         writer.flush().map_err(mcap())?;
+        let bytes = file.metadata().map_err(io())?.len();
         Ok(Self {
             path: path.to_owned(),
-            writer,
+            writer: Some(writer),
             file,
+            manifest: manifest.clone(),
+            kept: (0, bytes),
             said: vec![None; codecs.len()],
             codecs,
             cdr: Vec::new(),
@@ -113,6 +110,30 @@ impl Recorder {
             counts: Counts::default(),
             notes: BTreeMap::new(),
         })
+    }
+
+    /// Records a topic that was not there at the beginning, from now on; its place in the manifest, for
+    /// [`Recorder::record`].
+    ///
+    /// # Errors
+    /// When the file cannot be written, holds no more topics, or the message type contradicts itself.
+    pub fn add_topic(&mut self, topic: &Topic) -> Result<usize, RecordingError> {
+        let index = self.manifest.topics.len();
+        if index + 1 >= usize::from(u16::MAX) {
+            return Err(RecordingError::TooManyTopics { path: self.path.clone(), topics: index + 1 });
+        }
+        self.codecs.push(codec(&self.path, topic)?);
+        self.said.push(None);
+        self.manifest.topics.push(topic.clone());
+        // A reader takes the last table of contents that it finds. What was recorded so far is whole before
+        // it.
+        self.flush()?;
+        let contents = contents(&self.manifest);
+        self.write(|writer| {
+            writer.write_metadata(&contents)?;
+            add_channel(writer, index, topic)
+        })?;
+        Ok(index)
     }
 
     /// Records a message: the topic's place in the manifest, the envelope, and the bytes as they lie in memory.
@@ -127,16 +148,19 @@ impl Recorder {
                 topics: self.codecs.len(),
             });
         };
-        let fail = |cause| RecordingError::mcap(&self.path)(cause);
         let channel_id = channel(topic);
         if codec.encode(bytes, &mut self.cdr).is_ok() {
             let context = Context::of(envelope);
             if self.said[topic] != Some(context) {
                 self.said[topic] = Some(context);
                 let record = context.write(channel_id);
-                self.writer
-                    .write_private_record(CONTEXT, &record, PrivateRecordOptions::IncludeInChunks.into())
-                    .map_err(fail)?;
+                self.write(|writer| {
+                    writer.write_private_record(
+                        CONTEXT,
+                        &record,
+                        PrivateRecordOptions::IncludeInChunks.into(),
+                    )
+                })?;
             }
             let header = MessageHeader {
                 channel_id,
@@ -144,12 +168,15 @@ impl Recorder {
                 log_time: envelope.stamp_ns,
                 publish_time: envelope.origin_ns,
             };
-            self.writer.write_to_known_channel(&header, &self.cdr).map_err(fail)?;
+            let cdr = std::mem::take(&mut self.cdr);
+            let written = self.write(|writer| writer.write_to_known_channel(&header, &cdr));
+            self.cdr = cdr;
+            written?;
         } else {
             let record = write_misfit(channel_id, envelope, bytes);
-            self.writer
-                .write_private_record(MISFIT, &record, PrivateRecordOptions::IncludeInChunks.into())
-                .map_err(fail)?;
+            self.write(|writer| {
+                writer.write_private_record(MISFIT, &record, PrivateRecordOptions::IncludeInChunks.into())
+            })?;
             self.counts.misfits += 1;
         }
         self.counts.messages += 1;
@@ -179,7 +206,34 @@ impl Recorder {
         self.said.fill(None);
         self.chunk_bytes = 0;
         self.chunk_since = None;
-        self.writer.flush().map_err(RecordingError::mcap(&self.path))
+        self.write(mcap::Writer::flush)?;
+        self.kept = (self.counts.messages, self.file_bytes());
+        Ok(())
+    }
+
+    /// Writes something, or ends the recording where it was whole.
+    fn write<T>(
+        &mut self,
+        act: impl FnOnce(&mut mcap::Writer<BufWriter<File>>) -> mcap::McapResult<T>,
+    ) -> Result<T, RecordingError> {
+        let written = match &mut self.writer {
+            Some(writer) => act(writer),
+            None => Err(std::io::Error::other("the recording was cut before").into()),
+        };
+        written.map_err(|cause| self.cut(cause))
+    }
+
+    /// Takes back what is only half written, so that the file is one that was cut, and not a damaged one.
+    fn cut(&mut self, cause: mcap::McapError) -> RecordingError {
+        // Its end would be written behind what is half written.
+        drop(self.writer.take());
+        let (messages, bytes) = self.kept;
+        let _ = self.file.set_len(bytes);
+        let cause: Box<dyn std::error::Error + Send + Sync> = match cause {
+            mcap::McapError::Io(cause) => Box::new(cause),
+            cause => Box::new(cause),
+        };
+        RecordingError::Cut { path: self.path.clone(), messages, bytes, cause }
     }
 
     /// Keeps a word for the end of the file, such as how many messages were lost; see [`Manifest::notes`].
@@ -202,18 +256,48 @@ impl Recorder {
     /// # Errors
     /// When the file cannot be written; it opens up to its last closed chunk all the same.
     pub fn finish(mut self) -> Result<Counts, RecordingError> {
-        let mcap = || RecordingError::mcap(&self.path);
-        if !self.notes.is_empty() {
-            let metadata =
-                Metadata { name: METADATA_END.to_owned(), metadata: std::mem::take(&mut self.notes) };
-            self.writer.write_metadata(&metadata).map_err(mcap())?;
+        self.flush()?;
+        let notes = std::mem::take(&mut self.notes);
+        let end = Metadata { name: METADATA_END.to_owned(), metadata: notes };
+        self.write(|writer| {
+            if !end.metadata.is_empty() {
+                writer.write_metadata(&end)?;
+            }
+            writer.finish()
+        })?;
+        if let Some(writer) = self.writer.take()
+            && let Err(error) = writer.into_inner().into_inner()
+        {
+            return Err(self.cut(error.into_error().into()));
         }
-        self.writer.finish().map_err(mcap())?;
-        let io = || RecordingError::io(&self.path);
-        self.writer.into_inner().into_inner().map_err(|error| io()(error.into_error()))?;
-        self.file.sync_all().map_err(io())?;
-        Ok(self.counts)
+        match self.file.sync_all() {
+            Ok(()) => Ok(self.counts),
+            Err(error) => Err(self.cut(error.into())),
+        }
     }
+}
+
+/// The table of contents as it stands in the file.
+fn contents(manifest: &Manifest) -> Metadata {
+    // Names, numbers and texts, which are always JSON.
+    let manifest = serde_json::to_string(manifest).unwrap_or_default();
+    let metadata = [("manifest".to_owned(), manifest), ("version".to_owned(), VERSION.to_owned())];
+    Metadata { name: METADATA.to_owned(), metadata: metadata.into() }
+}
+
+fn add_channel(
+    writer: &mut mcap::Writer<BufWriter<File>>,
+    index: usize,
+    topic: &Topic,
+) -> mcap::McapResult<()> {
+    let text = topic.message.ros2msg();
+    let schema = writer.add_schema(&topic.message.ros2msg_name(), "ros2msg", text.as_bytes())?;
+    let about = BTreeMap::from([
+        ("publisher".to_owned(), topic.publisher.clone().unwrap_or_default()),
+        ("fingerprint".to_owned(), format!("{:016x}", topic.message.fingerprint())),
+    ]);
+    let topic = format!("/{}", topic.name);
+    writer.add_channel_with_id(channel(index), schema, &topic, "cdr", &about).map(|_| ())
 }
 
 /// The channel of a topic. Zero is left out, which some readers take for none.

@@ -7,6 +7,9 @@
 
 mod bells;
 mod chaos;
+mod damage;
+mod launchers;
+mod memory;
 mod ports;
 mod robot;
 mod runner;
@@ -21,6 +24,9 @@ fn main() -> ExitCode {
         Ok("robbed") => teardown::robbed_process(),
         Ok("tool") => teardown::tool_process(),
         Ok("cleaner") => chaos::cleaner_process(),
+        Ok("cramped") => memory::cramped_process(),
+        Ok("blind") => launchers::blind_process(),
+        Ok("squatted") => launchers::squatted_process(),
         Ok("bell") => bells::other_process(),
         Ok(which) => services::serve(which),
         Err(_) => runner::run(&[
@@ -44,6 +50,18 @@ fn main() -> ExitCode {
                 teardown::a_tools_place_is_taken_over_after_its_death,
             ),
             ("a_folder_of_somebody_else_is_left_alone", teardown::a_folder_of_somebody_else_is_left_alone),
+            ("a_launcher_without_its_lock_lives", launchers::a_launcher_without_its_lock_lives),
+            ("a_launcher_without_its_folder_lives", launchers::a_launcher_without_its_folder_lives),
+            ("a_board_whose_folder_was_deleted_knows", launchers::a_board_whose_folder_was_deleted_knows),
+            ("who_can_open_nothing_calls_nobody_dead", launchers::who_can_open_nothing_calls_nobody_dead),
+            ("everything_is_its_owners", launchers::everything_is_its_owners),
+            ("a_strangers_file_is_refused_by_its_name", launchers::a_strangers_file_is_refused_by_its_name),
+            ("a_page_that_was_written_over_heals", damage::a_page_that_was_written_over_heals),
+            ("a_message_without_room_is_lost_and_said", memory::a_message_without_room_is_lost_and_said),
+            ("what_cannot_be_said_is_no_panic", launchers::what_cannot_be_said_is_no_panic),
+            ("nothing_is_inherited", launchers::nothing_is_inherited),
+            ("damage_is_said", damage::damage_is_said),
+            ("nonsense_is_no_silence", damage::nonsense_is_no_silence),
             ("deaths_during_start_up_break_nothing", chaos::deaths_during_start_up_break_nothing),
         ]),
     }

@@ -27,6 +27,7 @@ pub(crate) fn topic<T: Message>(name: &str, publisher: Option<&str>, depth: usiz
         publisher: publisher.map(str::to_owned),
         readers: vec![],
         depth,
+        elements: 64,
         message: T::description(),
     }
 }
@@ -45,6 +46,7 @@ pub(crate) fn manifest(publishers: &[(&str, &str)]) -> Manifest {
             topic::<messages::TofRanges>("ranges", None, 64),
             topic::<Health>(&health_topic("slow-collector"), None, 4),
             topic::<Health>(&health_topic("gullible"), None, 4),
+            topic::<Health>(&health_topic("painter"), None, 4),
         ],
         ..Manifest::default()
     }

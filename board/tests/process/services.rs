@@ -116,6 +116,10 @@ pub(crate) fn serve(which: &str) -> ExitCode {
                 let _ = count.read();
             })
         }),
+        "chatty" => run(service("chatty"), |node, params: Params| {
+            node.every(Duration::from_micros(params.period_us));
+            Ok(|_| tracing::error!("\u{1b}[2Jmuch to say"))
+        }),
         "usurper" => run(service("usurper"), counter),
         "stuck" => run(service("stuck"), |node, _: Params| {
             node.every(Duration::from_millis(1));

@@ -37,7 +37,7 @@ pub(crate) fn a_killed_host_is_swept_with_its_services() {
     let mut line = String::new();
     BufReader::new(host.stdout.take().unwrap()).read_line(&mut line).unwrap();
     assert_eq!(line, "up\n");
-    assert_eq!(host::living_launcher(&place), Some(host.id()));
+    assert_eq!(host::living_launcher(&place).unwrap(), Some(host.id()));
     assert!(host::sweep().unwrap().iter().all(|swept| swept.board != name), "a board that is up was swept");
     let pids: Vec<u32> = {
         let switchboard = Switchboard::open(&place.file("switchboard")).unwrap();
@@ -46,7 +46,7 @@ pub(crate) fn a_killed_host_is_swept_with_its_services() {
     assert_eq!(pids.len(), 2);
     host.kill().unwrap();
     host.wait().unwrap();
-    assert_eq!(host::living_launcher(&place), None);
+    assert_eq!(host::living_launcher(&place).unwrap(), None);
     let swept =
         host::sweep().unwrap().into_iter().find(|swept| swept.board == name).expect("a board was swept");
     assert!(swept.files > 10, "{swept:?}");

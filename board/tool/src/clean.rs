@@ -2,8 +2,8 @@
 
 use crate::{Common, Outcome, show};
 use board::clock;
-use board::host::{living_launcher, sweep};
-use board::place::{Place, places};
+use board::host::{boards_up, sweep_named};
+use board::place::Place;
 use serde_json::json;
 use std::io;
 use std::process::{Command, ExitCode, Stdio};
@@ -13,9 +13,11 @@ use std::time::Duration;
 const LIMIT: Duration = Duration::from_secs(5);
 
 pub(crate) fn run(common: &Common) -> Outcome {
-    let swept = sweep()?;
+    let swept = sweep_named(common.board.as_deref())?;
+    let mut boards = boards_up()?;
+    boards.retain(|place| common.board.as_deref().is_none_or(|name| place.name() == name));
     let mut up = Vec::new();
-    for place in places().into_iter().filter(|place| living_launcher(place).is_some()) {
+    for place in boards {
         let cleaned = clean_dead(&place)?;
         up.push((place.name().to_owned(), cleaned));
     }
@@ -29,12 +31,14 @@ pub(crate) fn run(common: &Common) -> Outcome {
     }
     for swept in &swept {
         if swept.board.is_empty() {
-            show::line(&format!("removed {} files in shared memory that belonged to no board", swept.files))?;
+            let files = show::count(swept.files, "file");
+            show::line(&format!("removed {files} in shared memory that belonged to no board"))?;
             continue;
         }
-        show::line(&format!("board `{}`: its launcher is gone; removed {} files", swept.board, swept.files))?;
+        let files = show::count(swept.files, "file");
+        show::line(&format!("board `{}`: its launcher is gone; removed {files}", swept.board))?;
         for (service, pid) in &swept.ended {
-            show::line(&format!("  ended service `{service}` (process {pid})"))?;
+            show::line(&format!("  ended service `{}` (process {pid})", show::harmless(service)))?;
         }
     }
     for (name, cleaned) in &up {

@@ -1,16 +1,15 @@
 //! `board doctor`: is this machine fit, and are its boards well?
 
-use crate::connect::{Life, life};
+use crate::connect::{self, Life, life};
 use crate::{Common, Outcome, show};
 use board::clock;
-use board::host::{half_made, living_launcher};
+use board::host::{half_made, living_launcher, needed_bytes};
 use board::manifest::Manifest;
 use board::place::{Place, boards_folder, orphans, places};
-use board::switchboard::{SlotState, Switchboard};
-use messages::Time;
+use board::switchboard::{NO_SLOT, SlotState, Switchboard};
 use rustix::process::{Resource, getrlimit, getuid};
 use std::os::unix::fs::MetadataExt as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -54,10 +53,11 @@ fn problem(check: &str, found: impl Into<String>, advice: impl Into<String>) -> 
 }
 
 pub(crate) fn run(common: &Common) -> Outcome {
-    let mut findings = vec![shared_memory(), folder(), user()];
+    let places = chosen(common)?;
+    let mut findings = vec![shared_memory(), folder(), user(), logout()];
     findings.extend(limits());
     findings.extend(clocks());
-    findings.extend(boards());
+    findings.extend(boards(&places));
     let problems = findings.iter().filter(|finding| finding.verdict == Verdict::Problem).count();
     if common.json {
         show::json(&serde_json::to_value(&findings)?)?;
@@ -65,6 +65,13 @@ pub(crate) fn run(common: &Common) -> Outcome {
         print(&findings)?;
     }
     Ok(if problems > 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+}
+
+/// The boards that are looked at: the one that is named, which must be there, or all.
+fn chosen(common: &Common) -> Result<Vec<Place>, Box<dyn std::error::Error>> {
+    let Some(name) = &common.board else { return Ok(places()) };
+    let place = Place::new(name)?;
+    if place.exists() { Ok(vec![place]) } else { Err(connect::unknown(name, &places()).into()) }
 }
 
 fn print(findings: &[Finding]) -> std::io::Result<()> {
@@ -76,9 +83,10 @@ fn print(findings: &[Finding]) -> std::io::Result<()> {
             Verdict::Warn => show::doubtful(colours, "warn   "),
             Verdict::Problem => show::bad(colours, "problem"),
         };
+        let (check, found) = (show::harmless(check), show::harmless(found));
         show::line(&format!("{verdict}  {check:<width$}  {found}"))?;
         if let Some(advice) = advice {
-            show::line(&format!("         {:<width$}  -> {advice}", ""))?;
+            show::line(&format!("         {:<width$}  -> {}", "", show::harmless(advice)))?;
         }
     }
     Ok(())
@@ -97,13 +105,16 @@ fn shared_memory() -> Finding {
     let (size, free) = (found.f_blocks * found.f_frsize, found.f_bavail * found.f_frsize);
     let text = format!("/dev/shm has {} free of {}", show::bytes(free), show::bytes(size));
     let larger = "enlarge it: `mount -o remount,size=1G /dev/shm` (in a container: --shm-size=1g)";
-    if free < 32 * MIB {
-        // A page that cannot be had when it is first touched kills the process that touches it.
-        problem(
-            CHECK,
-            text,
-            format!("a process that touches a page more than there is dies of SIGBUS; {larger}"),
-        )
+    if found.f_flag.contains(rustix::fs::StatVfsMountFlags::RDONLY) {
+        let mend = "no board can be made there: `mount -o remount,rw /dev/shm`";
+        problem(CHECK, format!("{text}, and is mounted read-only"), mend)
+    } else if found.f_files > 0 && found.f_favail < 1000 {
+        let text = format!("{text}, and has room for {} more files", found.f_favail);
+        problem(CHECK, text, "a board makes a few hundred: `mount -o remount,nr_inodes=100000 /dev/shm`")
+    } else if free < 8 * MIB {
+        problem(CHECK, text, format!("a robot takes a few MiB, and is refused without: {larger}"))
+    } else if free < 32 * MIB {
+        warn(CHECK, text, format!("enough for a small robot; {larger}"))
     } else if !is_tmpfs {
         warn(
             CHECK,
@@ -164,18 +175,32 @@ fn user() -> Finding {
     ok(CHECK, format!("user {}{others}", getuid().as_raw()))
 }
 
+/// Whether what lies in shared memory stays when this user logs out.
+fn logout() -> Finding {
+    const CHECK: &str = "logout";
+    match board::logout::removes_shared_memory() {
+        None => ok(CHECK, "this user's shared memory stays at a logout"),
+        Some(_) => warn(
+            CHECK,
+            "systemd removes this user's shared memory when the last session ends (RemoveIPC in logind.conf), and a robot that still \
+             runs loses its board",
+            "before `launch up --detach`: `loginctl enable-linger`",
+        ),
+    }
+}
+
 fn limits() -> Vec<Finding> {
     let soft = |resource| getrlimit(resource).current;
     let text = |limit: Option<u64>| limit.map_or("no limit".to_owned(), |limit| limit.to_string());
     let files = soft(Resource::Nofile);
-    let mut findings = vec![if files.is_some_and(|files| files < 1024) {
-        problem(
-            "open files",
-            format!("{} a process", text(files)),
-            "each port of a service opens a few; `ulimit -n 4096`, or LimitNOFILE=4096 in the unit",
-        )
-    } else {
-        ok("open files", format!("{} a process", text(files)))
+    // What a process may ask for, it asks for by itself.
+    let hard = getrlimit(Resource::Nofile).maximum;
+    let found = format!("{} a process, {} when it asks", text(files), text(hard));
+    let mend = "each port of a service opens a few; `ulimit -n 4096`, or LimitNOFILE=4096 in the unit";
+    let mut findings = vec![match hard {
+        Some(hard) if hard < 256 => problem("open files", found, mend),
+        Some(hard) if hard < 1024 => warn("open files", found, mend),
+        _ => ok("open files", found),
     }];
     // Root, and whoever has the capability, needs no limit raised.
     let capable = getuid().is_root() || has_capability(23);
@@ -258,27 +283,31 @@ fn clocks() -> Vec<Finding> {
     findings
 }
 
-fn boards() -> Vec<Finding> {
+fn boards(places: &[Place]) -> Vec<Finding> {
     let mut findings = Vec::new();
-    for place in places() {
-        match living_launcher(&place) {
-            None => findings.push(warn(
+    for place in places {
+        match living_launcher(place) {
+            Err(error) => findings.push(problem(
+                &format!("board {}", place.name()),
+                error.to_string(),
+                "nothing of it was touched",
+            )),
+            Ok(None) => findings.push(warn(
                 &format!("board {}", place.name()),
                 "its launcher is gone, and its remains are still here",
                 "`board clean` ends its services and removes it",
             )),
-            Some(pid) => findings.extend(board(&place, pid)),
+            Ok(Some(pid)) => findings.extend(board(place, pid)),
         }
     }
-    let orphans = orphans();
-    findings.push(if orphans.is_empty() {
-        ok("leftovers", "no shared memory without a board")
-    } else {
-        warn(
+    findings.push(match orphans() {
+        Ok(orphans) if orphans.is_empty() => ok("leftovers", "no shared memory without a board"),
+        Ok(orphans) => warn(
             "leftovers",
-            format!("{} files in /dev/shm belong to no board", orphans.len()),
+            format!("{} in /dev/shm belonging to no board", show::count(orphans.len(), "file")),
             "`board clean` removes them",
-        )
+        ),
+        Err(error) => problem("leftovers", error.to_string(), "nothing of them was touched"),
     });
     findings
 }
@@ -301,17 +330,22 @@ fn board(place: &Place, launcher: u32) -> Vec<Finding> {
     let mut findings = vec![ok(
         &check,
         format!(
-            "up (launcher {launcher}), {} topics, {} files with {} in shared memory",
-            manifest.topics.len(),
-            files.len(),
-            show::bytes(bytes)
+            "up (launcher {launcher}), {}, {} with {} in shared memory ({} is what its graph takes)",
+            show::count(manifest.topics.len(), "topic"),
+            show::count(files.len(), "file"),
+            show::bytes(bytes),
+            show::bytes(needed_bytes(&manifest))
         ),
     )];
     let half_made = half_made(place);
     if let Some(file) = half_made.first() {
         findings.push(warn(
             &check,
-            format!("{} files half made by a process that died, as {}", half_made.len(), name_of(file)),
+            format!(
+                "{} half made by a process that died, such as {}",
+                show::count(half_made.len(), "file"),
+                name_of(file)
+            ),
             "services may hang on them: `board clean`",
         ));
     }
@@ -319,12 +353,53 @@ fn board(place: &Place, launcher: u32) -> Vec<Finding> {
     if dead_tools > 0 {
         findings.push(warn(
             &check,
-            format!("{dead_tools} tools were killed and still hold their ports"),
+            format!("{} killed, still holding ports", show::count(dead_tools, "tool")),
             "topics take only so many readers: `board clean`",
         ));
     }
+    findings.extend(modes(&check, place, &files));
+    findings.extend(page(&check, &manifest, &switchboard));
     findings.extend(services(&check, &manifest, &switchboard));
     findings
+}
+
+/// Files that others could read, or worse.
+fn modes(check: &str, place: &Place, files: &[PathBuf]) -> Option<Finding> {
+    let fixed =
+        ["", "board.json", "switchboard", "launcher.lock", "control.sock"].map(|name| place.file(name));
+    let is_open = |file: &&PathBuf| {
+        let found = std::fs::symlink_metadata(file);
+        found.is_ok_and(|found| found.mode() & 0o077 != 0 || found.uid() != getuid().as_raw())
+    };
+    let open: Vec<&PathBuf> = files.iter().chain(&fixed).filter(is_open).collect();
+    let first = open.first()?;
+    let found =
+        format!("{} not its owner's alone, such as {}", show::count(open.len(), "file"), first.display());
+    let mend = format!("whoever may write there can end the robot: `chmod go= {}`", first.display());
+    Some(if files.contains(first) { problem(check, found, mend) } else { warn(check, found, mend) })
+}
+
+/// What cannot stand on a page that only sound processes have written to.
+fn page(check: &str, manifest: &Manifest, switchboard: &Switchboard) -> Option<Finding> {
+    const MEND: &str = "a broken process has written over it, and the launcher should have mended it: `launch stop`, `launch up`";
+    let header = switchboard.header();
+    if header.lockstep.load(Ordering::Acquire) > 1 {
+        return Some(problem(check, "the page is damaged: it says no kind of time", MEND));
+    }
+    let given = header.generations.load(Ordering::Acquire);
+    let is_damaged = |index: u32| {
+        switchboard.topic(index).is_some_and(|topic| {
+            let publisher = topic.publisher.load(Ordering::Acquire);
+            topic.generation.load(Ordering::Acquire) > given
+                || (publisher != NO_SLOT && switchboard.slot(publisher).is_none())
+        })
+    };
+    let topics = (0_u32..).zip(&manifest.topics);
+    let names: Vec<&str> =
+        topics.filter(|&(index, _)| is_damaged(index)).map(|(_, topic)| topic.name.as_str()).collect();
+    let first = names.first()?;
+    let found = format!("the page is damaged for {}, such as `{first}`", show::count(names.len(), "topic"));
+    Some(problem(check, found, MEND))
 }
 
 fn services(check: &str, manifest: &Manifest, switchboard: &Switchboard) -> Vec<Finding> {
@@ -334,9 +409,8 @@ fn services(check: &str, manifest: &Manifest, switchboard: &Switchboard) -> Vec<
     let mut seen = Vec::new();
     for (_, slot) in switchboard.taken().filter(|(_, slot)| slot.is_service.load(Ordering::Relaxed) != 0) {
         let (role, pid) = (slot.role(), slot.pid.load(Ordering::Relaxed));
-        let silent = now.since(slot.heartbeat());
-        let since = slot.step_since_ns.load(Ordering::Relaxed);
-        let in_step = if since == 0 { Duration::ZERO } else { now.since(Time::from_nanos(since)) };
+        let silent = slot.silence(now).unwrap_or_default();
+        let in_step = slot.in_step(now).unwrap_or_default();
         let restart = format!("`launch restart {role}`");
         match life(slot) {
             Life::Dead => findings.push(problem(
@@ -370,7 +444,7 @@ fn services(check: &str, manifest: &Manifest, switchboard: &Switchboard) -> Vec<
         findings.push(warn(check, format!("`{missing}` is not there"), format!("`launch logs {missing}`")));
     }
     if findings.is_empty() && !seen.is_empty() {
-        findings.push(ok(check, format!("{} services take steps", seen.len())));
+        findings.push(ok(check, format!("{} taking steps", show::count(seen.len(), "service"))));
     }
     findings
 }

@@ -1,12 +1,12 @@
 //! `board echo`: messages as they come.
 
-use crate::{Common, Outcome, connect, show};
+use crate::connect::{self, Watch};
+use crate::{Common, EXIT_TIMEOUT, Outcome, show};
 use board::tap::now;
-use board::{Envelope, clock};
+use board::{Envelope, arguments};
 use messages::{Description, Kind, Time, elements_offset};
 use serde_json::{Value, json};
 use std::process::ExitCode;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 #[derive(Debug, clap::Args)]
@@ -19,9 +19,10 @@ pub(crate) struct Options {
     /// Print this field only: `pose.x_m`, `elements.3`.
     #[arg(long, value_name = "PATH")]
     field: Option<String>,
-    /// End after so many seconds without a message, with exit code 1 when none came at all.
-    #[arg(long, value_name = "S")]
-    timeout: Option<f64>,
+    /// End after so many seconds without a message, with exit code 3 when none came at all, or fewer than -n
+    /// asks for.
+    #[arg(long, value_name = "SECONDS", value_parser = arguments::seconds)]
+    timeout: Option<Duration>,
 }
 
 /// Elements and array items that the form for people shows.
@@ -30,35 +31,52 @@ const SHOWN: usize = 8;
 const LOOK: Duration = Duration::from_millis(200);
 
 pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
-    let interrupted = connect::interrupted()?;
-    let tap = connect::join(common)?;
-    let description = connect::topic(tap.manifest(), &options.topic)?.1.message.clone();
+    let place = connect::choose(common)?;
+    let mut watch = Watch::begin(place.clone())?;
+    let tap = connect::join(&place)?;
+    let (index, topic) = connect::topic(tap.manifest(), &options.topic)?;
+    let description = topic.message.clone();
     if let Some(path) = &options.field {
         check_path(&description, path)?;
     }
     let mut reader = tap.reader(&options.topic)?;
-    let patience = options.timeout.map(|seconds| Duration::from_secs_f64(seconds.clamp(0.0, 1e6)));
-    let mut waiting_since = clock::monotonic();
     let mut printed = 0;
-    while !interrupted.load(Ordering::Relaxed) && options.count.is_none_or(|count| printed < count) {
+    let all = |printed| options.count.is_none_or(|count| printed >= count);
+    let mut code = ExitCode::SUCCESS;
+    while options.count.is_none() || !all(printed) {
+        if watch.end_said()?.is_some() {
+            code = if all(printed) { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+            break;
+        }
         let heard = tap.bell();
         if let Some((envelope, bytes)) = reader.next() {
             let age = now(tap.switchboard()).since(Time::from_nanos(envelope.stamp_ns));
             print(common, options, &description, &envelope, age, bytes)?;
             printed += 1;
-            waiting_since = clock::monotonic();
+            watch.heard();
             continue;
         }
-        if patience.is_some_and(|patience| clock::monotonic().since(waiting_since) >= patience) {
+        let waited = watch.wait(|| connect::awaited(&tap, index));
+        if options.timeout.is_some_and(|timeout| waited >= timeout) {
+            let enough = printed > 0 && all(printed);
+            code = if enough { ExitCode::SUCCESS } else { ExitCode::from(EXIT_TIMEOUT) };
             break;
         }
-        tap.wait(heard, patience.unwrap_or(LOOK).min(LOOK));
+        tap.wait(heard, options.timeout.map_or(LOOK, |timeout| timeout.saturating_sub(waited).min(LOOK)));
     }
     if reader.lost() > 0 {
-        eprintln!("{} messages came faster than they could be printed", reader.lost());
+        show::note(&format!(
+            "{} came faster than could be printed",
+            show::count(reader.lost() as usize, "message")
+        ));
     }
-    let in_vain = printed == 0 && patience.is_some() && options.count != Some(0);
-    Ok(if in_vain { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    if reader.invalid() > 0 {
+        show::note(&format!(
+            "{} were not what they said, and are left out",
+            show::count(reader.invalid() as usize, "message")
+        ));
+    }
+    Ok(code)
 }
 
 fn print(
@@ -93,7 +111,7 @@ fn print(
         show::colours(),
         &format!(
             "{} #{}  stamp {:.6} s  age {}  origin {} before",
-            options.topic,
+            show::harmless(&options.topic),
             envelope.sequence,
             envelope.stamp_ns as f64 * 1e-9,
             show::duration(age.as_nanos() as f64),
@@ -109,6 +127,7 @@ fn print(
     }
     let width = rows.iter().map(|(name, ..)| name.len()).max().unwrap_or(0);
     for (name, value, unit) in rows {
+        let (name, unit) = (show::harmless(&name), show::harmless(unit));
         show::line(format!("  {name:<width$}  {value} {unit}").trim_end())?;
     }
     Ok(())

@@ -1,17 +1,19 @@
 //! `board info`: what a topic's messages are.
 
 use crate::connect::{self, publisher_life};
-use crate::{Common, Outcome, list, show};
+use crate::{Common, Outcome, list, recorded, show};
 use board::tap::{Tap, now};
 use board::{Envelope, clock};
 use messages::{Description, Kind, Time};
 use serde_json::json;
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
-    /// The topic.
+    /// The topic, or the recording.
+    #[arg(value_name = "TOPIC|FILE.mcap")]
     topic: String,
 }
 
@@ -19,9 +21,13 @@ pub(crate) struct Options {
 const PATIENCE: Duration = Duration::from_millis(300);
 
 pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
-    let look = connect::look(common)?;
+    if options.topic.ends_with(".mcap") {
+        return recorded::run(common, Path::new(&options.topic));
+    }
+    let place = connect::choose(common)?;
+    let look = connect::look(&place)?;
     let (index, topic) = connect::topic(&look.manifest, &options.topic)?;
-    let last = last_message(&connect::join(common)?, &topic.name)?;
+    let last = last_message(&connect::join(&place)?, &topic.name)?;
     let message = &topic.message;
     let life = publisher_life(&look.switchboard, index);
     let now = now(&look.switchboard);
@@ -39,8 +45,10 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
         return Ok(ExitCode::SUCCESS);
     }
     let colours = show::colours();
-    show::line(&format!("{} ({})", topic.name, message.name))?;
-    show::line(&format!("  {}", message.doc.trim()))?;
+    show::line(&format!("{} ({})", show::harmless(&topic.name), show::harmless(&message.name)))?;
+    for line in message.doc.trim().lines() {
+        show::line(&format!("  {}", show::harmless(line.trim())))?;
+    }
     show::line("")?;
     let size = match &message.element {
         Some(element) => format!("{} B and elements of {} B", message.size, element.size()),
@@ -48,7 +56,10 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
     };
     let facts = [
         ("publisher", list::publisher(colours, topic.publisher.as_deref(), life)),
-        ("readers", if topic.readers.is_empty() { "none".into() } else { topic.readers.join(", ") }),
+        (
+            "readers",
+            if topic.readers.is_empty() { "none".into() } else { show::harmless(&topic.readers.join(", ")) },
+        ),
         ("depth", topic.depth.to_string()),
         ("size", size),
         ("fingerprint", format!("{:016x}", message.fingerprint())),
@@ -56,11 +67,11 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
             "last message",
             last.map_or("none yet".into(), |(envelope, bytes)| {
                 format!(
-                    "number {}, {} ago, {} since its origin, {} bytes, generation {}",
+                    "number {}, {} ago, {} since its origin, {}, generation {}",
                     envelope.sequence,
                     show::duration(now.since(Time::from_nanos(envelope.stamp_ns)).as_nanos() as f64),
                     show::duration(now.since(Time::from_nanos(envelope.origin_ns)).as_nanos() as f64),
-                    bytes,
+                    show::count(bytes, "byte"),
                     envelope.generation
                 )
             }),
@@ -73,8 +84,7 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
     let mut table = show::table(&["offset", "field", "type", "unit", "meaning"]);
     add_fields(&mut table, message, "", 0);
     if let Some(element) = &message.element {
-        let doc =
-            if let Kind::Record(record) = element { record.doc.trim().to_owned() } else { String::new() };
+        let doc = if let Kind::Record(record) = element { words(&record.doc) } else { String::new() };
         table.add_row([String::new(), "elements[]".into(), kind(element), String::new(), doc]);
         if let Kind::Record(record) = element {
             add_fields(&mut table, record, "elements[].", 0);
@@ -90,10 +100,10 @@ fn add_fields(table: &mut comfy_table::Table, record: &Description, prefix: &str
         let offset = base + field.offset;
         table.add_row([
             offset.to_string(),
-            name.clone(),
-            kind(&field.kind),
-            field.unit.clone(),
-            field.doc.trim().to_owned(),
+            show::harmless(&name),
+            show::harmless(&kind(&field.kind)),
+            show::harmless(&field.unit),
+            words(&field.doc),
         ]);
         match &field.kind {
             Kind::Record(inner) => add_fields(table, inner, &format!("{name}."), offset),
@@ -105,6 +115,11 @@ fn add_fields(table: &mut comfy_table::Table, record: &Description, prefix: &str
             _ => {}
         }
     }
+}
+
+/// A text of one or several lines as one.
+fn words(text: &str) -> String {
+    show::harmless(&text.split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
 fn kind(kind: &Kind) -> String {

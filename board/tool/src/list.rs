@@ -2,8 +2,8 @@
 
 use crate::connect::{self, Life, Look, life, publisher_life};
 use crate::{Common, Outcome, show};
-use board::clock;
 use board::tap::now;
+use board::{arguments, clock};
 use messages::Time;
 use serde_json::json;
 use std::process::ExitCode;
@@ -16,12 +16,12 @@ pub(crate) struct Options {
     #[arg(long)]
     services: bool,
     /// Seconds over which rates are measured.
-    #[arg(long, value_name = "S", default_value_t = 0.5)]
-    sample: f64,
+    #[arg(long, value_name = "SECONDS", default_value = "0.5", value_parser = arguments::seconds)]
+    sample: Duration,
 }
 
 pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
-    let look = connect::look(common)?;
+    let look = connect::look(&connect::choose(common)?)?;
     if options.services {
         services(common, &look)?
     } else {
@@ -39,7 +39,7 @@ fn topics(common: &Common, look: &Look, options: &Options) -> std::io::Result<()
     };
     let before = counts();
     let since = clock::monotonic();
-    clock::sleep(Duration::from_secs_f64(options.sample.clamp(0.0, 60.0)));
+    clock::sleep(options.sample);
     let after = counts();
     let passed_s = clock::monotonic().seconds_since(since).max(1e-6);
     let now = now(page);
@@ -58,10 +58,14 @@ fn topics(common: &Common, look: &Look, options: &Options) -> std::io::Result<()
         }));
         let readers = topic.readers.len();
         table.add_row([
-            topic.name.clone(),
-            topic.message.name.clone(),
+            show::harmless(&topic.name),
+            show::harmless(&topic.message.name),
             publisher(colours, topic.publisher.as_deref(), life),
-            if tools == 0 { readers.to_string() } else { format!("{readers} + {tools} tools") },
+            if tools == 0 {
+                readers.to_string()
+            } else {
+                format!("{readers} + {}", show::count(tools, "tool"))
+            },
             after[index].to_string(),
             if rate_hz > 0.0 { format!("{} Hz", show::three(rate_hz)) } else { "-".into() },
             age_ns.map_or("-".into(), show::duration),
@@ -74,8 +78,8 @@ fn topics(common: &Common, look: &Look, options: &Options) -> std::io::Result<()
 }
 
 pub(crate) fn publisher(colours: bool, name: Option<&str>, life: Life) -> String {
-    match (name, life) {
-        (Some(name), Life::Lives) => show::good(colours, name),
+    match (name.map(show::harmless), life) {
+        (Some(name), Life::Lives) => show::good(colours, &name),
         (Some(name), Life::Idle) => show::doubtful(colours, &format!("{name} (takes no steps)")),
         (Some(name), Life::Dead) => show::bad(colours, &format!("{name} (dead)")),
         (Some(name), Life::Absent) => show::doubtful(colours, &format!("{name} (not there)")),
@@ -104,9 +108,8 @@ fn services(common: &Common, look: &Look) -> std::io::Result<()> {
         let is_service = slot.is_service.load(Ordering::Relaxed) != 0;
         let (life, state) = (life(slot), format!("{:?}", slot.state()).to_lowercase());
         let pid = slot.pid.load(Ordering::Relaxed);
-        let heartbeat_ns = now.since(slot.heartbeat()).as_nanos() as f64;
-        let since = slot.step_since_ns.load(Ordering::Relaxed);
-        let in_step_ns = (since != 0).then(|| now.since(Time::from_nanos(since)).as_nanos() as f64);
+        let heartbeat_ns = slot.silence(now).map(|silence| silence.as_nanos() as f64);
+        let in_step_ns = slot.in_step(now).map(|passed| passed.as_nanos() as f64);
         let steps = slot.steps.load(Ordering::Relaxed);
         all.push(json!({
             "service": slot.role(), "tool": !is_service, "slot": slot_number, "state": state, "life": life, "pid": pid,
@@ -118,12 +121,13 @@ fn services(common: &Common, look: &Look) -> std::io::Result<()> {
             _ => show::doubtful(colours, &state),
         };
         table.add_row([
-            if is_service { slot.role() } else { format!("{} (tool)", slot.role()) },
+            // The page is everybody's to write on.
+            format!("{}{}", show::harmless(&slot.role()), if is_service { "" } else { " (tool)" }),
             state,
             pid.to_string(),
             steps.to_string(),
             in_step_ns.map_or("-".into(), show::duration),
-            if slot.heartbeat() == Time::ZERO { "-".into() } else { show::duration(heartbeat_ns) },
+            heartbeat_ns.map_or("-".into(), show::duration),
         ]);
     }
     for name in &look.manifest.services {

@@ -4,11 +4,14 @@ mod clean;
 mod connect;
 mod doctor;
 mod echo;
+mod examples;
 mod info;
 mod list;
+mod output;
 mod publish;
 mod rate;
 mod record;
+mod recorded;
 mod replay;
 mod show;
 
@@ -18,12 +21,19 @@ use std::process::ExitCode;
 
 type Outcome = Result<ExitCode, Box<dyn std::error::Error>>;
 
+/// The exit code of a command that has waited as long as `--timeout` says.
+pub(crate) const EXIT_TIMEOUT: u8 = 3;
+
 #[derive(Debug, Parser)]
 #[command(
     name = "board",
     version,
     about = "Look at the message board of a running robot",
-    after_help = "Examples:\n  board list                                 what is on the board, who publishes it, how often\n  board echo safety/clearance                every message, with names and units\n  board echo wheels/odometry --field left_mps --json -n 10\n  board rate tof/ranges laser/scan           messages per second and how regular they are\n  board doctor                               what is wrong with this machine, and what to do\n\nWithout --board, the only board that is up is meant."
+    after_help = examples::help(
+        examples::BOARD,
+        "Without --board, the only board that is up is meant.\n\
+         Exit codes: 0 it is done; 1 it is not, and the error says why; 2 the command line is wrong; 3 --timeout is over."
+    )
 )]
 struct Cli {
     #[command(flatten)]
@@ -45,49 +55,45 @@ struct Common {
 #[derive(Debug, Subcommand)]
 enum Verb {
     /// Topics: type, publisher, readers, how many messages, how often, how long ago.
-    #[command(
-        after_help = "Examples:\n  board list\n  board list --services\n  board list --json | jq '.[].topic'"
-    )]
+    #[command(after_help = examples::help(examples::LIST, ""))]
     List(list::Options),
-    /// What a topic's messages look like: fields, types, units, meanings.
-    #[command(after_help = "Example:\n  board info safety/clearance")]
+    /// What a topic's messages look like (fields, types, units, meanings), or what a recording holds.
+    #[command(after_help = examples::help(examples::INFO, ""))]
     Info(info::Options),
     /// Print messages as they come, beginning with the last one.
-    #[command(
-        after_help = "Examples:\n  board echo safety/clearance\n  board echo pose --field pose.x_m\n  board echo laser/scan --json -n 1 | jq '.message.elements | length'"
-    )]
+    #[command(after_help = examples::help(
+        examples::ECHO,
+        "Numbers are shown with six digits; --json gives all of them."
+    ))]
     Echo(echo::Options),
     /// Messages per second, periods and jitter.
-    #[command(after_help = "Examples:\n  board rate\n  board rate tof/ranges --interval 5 -n 1 --json")]
+    #[command(after_help = examples::help(examples::RATE, ""))]
     Rate(rate::RateOptions),
     /// How old messages are when they arrive: since they were published, and since the sensor reading behind them.
-    #[command(after_help = "Example:\n  board delay wheels/applied -n 1000")]
+    #[command(after_help = examples::help(examples::DELAY, ""))]
     Delay(rate::DelayOptions),
     /// Publish messages by hand.
-    #[command(
-        after_help = "Examples:\n  board publish mission/order '{\"office\": 7}'\n  board publish wheels/desired '{}' --rate 20 -n 100 --force\n  board publish safety/clearance --raw random --seed 7 -n 1000 --rate 500\n  board publish laser/scan --raw @scan.bin\n\nFields that are not given are zero. `--raw` publishes bytes as they are, whatever they mean, and so needs no --force."
-    )]
+    #[command(after_help = examples::help(
+        examples::PUBLISH,
+        "Fields that are not given are zero. `--raw` publishes bytes as they are, whatever they mean.\n\
+         Where a service publishes, and for wheels/ and safety/ where a service listens, only with --force."
+    ))]
     Publish(publish::Options),
     /// Record messages into a file that also the tools of ROS 2 and Foxglove read; until Ctrl-C, or until the board goes down.
-    #[command(
-        after_help = "Examples:\n  board record -o drive.mcap\n  board record 'tof/*' wheels/applied -o short.mcap --duration 10"
-    )]
+    #[command(after_help = examples::help(examples::RECORD, ""))]
     Record(record::Options),
     /// Publish the messages of a recording, in the name of those who published them.
-    #[command(
-        after_help = "Examples:\n  board replay drive.mcap --topics 'tof/*',tag/ranges\n  board replay drive.mcap --speed 10 --loop"
-    )]
+    #[command(after_help = examples::help(examples::REPLAY, ""))]
     Replay(replay::Options),
-    /// Clear away boards whose launcher is gone, and what the dead have left on boards that are up.
-    #[command(after_help = "Example:\n  board clean")]
+    /// Clear away boards whose launcher is gone, and what the dead have left on boards that are up; with
+    /// --board, that one alone.
+    #[command(after_help = examples::help(examples::CLEAN, ""))]
     Clean,
     /// Check this machine and its boards; ends with 1 when there is a problem.
-    #[command(after_help = "Example:\n  board doctor || echo 'not fit to drive'")]
+    #[command(after_help = examples::help(examples::DOCTOR, ""))]
     Doctor,
     /// Print a script that lets a shell complete commands.
-    #[command(
-        after_help = "Example:\n  board completions bash > ~/.local/share/bash-completion/completions/board"
-    )]
+    #[command(after_help = examples::help(examples::COMPLETIONS, ""))]
     Completions {
         /// The shell.
         shell: clap_complete::Shell,
@@ -114,10 +120,7 @@ fn main() -> ExitCode {
         Verb::Replay(options) => replay::run(common, options),
         Verb::Clean => clean::run(common),
         Verb::Doctor => doctor::run(common),
-        Verb::Completions { shell } => {
-            clap_complete::generate(*shell, &mut Cli::command(), "board", &mut io::stdout());
-            Ok(ExitCode::SUCCESS)
-        }
+        Verb::Completions { shell } => completions(*shell),
         Verb::CleanDead { name } => {
             board::host::clean_dead(name).map(|_| ExitCode::SUCCESS).map_err(Into::into)
         }
@@ -127,7 +130,15 @@ fn main() -> ExitCode {
         if error.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe) {
             return ExitCode::SUCCESS;
         }
-        eprintln!("{}: {error}", show::bad(io::IsTerminal::is_terminal(&io::stderr()), "error"));
+        show::error(&*error);
         ExitCode::FAILURE
     })
+}
+
+fn completions(shell: clap_complete::Shell) -> Outcome {
+    // Not at once to the output, where a closed pipe would be a panic.
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Cli::command(), "board", &mut script);
+    show::raw(&script)?;
+    Ok(ExitCode::SUCCESS)
 }

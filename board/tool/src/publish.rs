@@ -1,15 +1,14 @@
 //! `board publish`: messages by hand.
 
-use crate::connect::{self, Life, publisher_life};
+use crate::connect::{self, Watch, who_obeys};
 use crate::{Common, Outcome, show};
-use board::clock;
+use board::{arguments, clock};
 use messages::{Description, elements_offset};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use serde_json::json;
 use std::error::Error;
 use std::process::ExitCode;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 #[derive(Debug, clap::Args)]
@@ -26,29 +25,25 @@ pub(crate) struct Options {
     #[arg(long, value_name = "N", default_value_t = 1, requires = "raw")]
     seed: u64,
     /// Messages per second; without -n, until Ctrl-C.
-    #[arg(long, value_name = "HZ")]
-    rate: Option<f64>,
+    #[arg(long = "rate", value_name = "HZ", value_parser = arguments::period)]
+    period: Option<Duration>,
     /// How many messages [default: 1; with --rate: until Ctrl-C]
     #[arg(short = 'n', long, value_name = "N")]
     count: Option<u64>,
-    /// Publish beside a service that publishes this topic.
+    /// Publish where a service publishes, or where one listens that moves the robot.
     #[arg(long)]
     force: bool,
 }
 
-/// Readers find a publisher when they next look, and get nothing from one that has left before.
-const LINGER: Duration = Duration::from_millis(300);
 /// Most elements of a random message.
 const RANDOM_ELEMENTS: u64 = 2000;
 
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "`{publisher}` publishes `{topic}`, and lives; messages of yours would mix with its own, and whoever obeys them might move. \
-     Stop it first, or say --force to publish beside it"
+    "{why}: whoever obeys a message of yours might move. Stop it first, or say --force to publish all the same"
 )]
 struct Refused {
-    topic: String,
-    publisher: String,
+    why: String,
 }
 
 enum Content {
@@ -57,30 +52,24 @@ enum Content {
 }
 
 pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
-    let interrupted = connect::interrupted()?;
-    let mut tap = connect::join(common)?;
+    let place = connect::choose(common)?;
+    let mut watch = Watch::begin(place.clone())?;
+    let mut tap = connect::join(&place)?;
     let (index, topic) = connect::topic(tap.manifest(), &options.topic)?;
     let description = topic.message.clone();
-    if let Some(publisher) = topic.publisher.clone()
-        && !options.force
-        && options.raw.is_none()
-        && publisher_life(tap.switchboard(), index) == Life::Lives
+    if !options.force
+        && let Some(why) = who_obeys(tap.manifest(), tap.switchboard(), index)
     {
-        return Err(Refused { topic: options.topic.clone(), publisher }.into());
+        return Err(Refused { why }.into());
     }
     let mut content = content(options, &description)?;
-    let period = match options.rate {
-        Some(rate) if rate > 0.0 && rate.is_finite() => {
-            Some(Duration::from_secs_f64((1.0 / rate).min(86_400.0)))
-        }
-        Some(rate) => return Err(format!("--rate {rate}: more than zero is needed").into()),
-        None => None,
-    };
+    let period = options.period;
     let count = options.count.unwrap_or(if period.is_some() { u64::MAX } else { 1 });
     let publisher = tap.publisher(&options.topic)?;
     let begin = clock::monotonic();
-    let mut published = 0;
-    while published < count && !interrupted.load(Ordering::Relaxed) {
+    let mut published = 0_u64;
+    let mut ended = false;
+    while published < count && !ended {
         match &mut content {
             Content::Fixed(bytes) => publisher.publish(bytes)?,
             Content::Random(random) => publisher.publish(&random_message(random, &description))?,
@@ -92,22 +81,23 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
             // On the multiples of the period, so that the rate holds whatever a message takes.
             let due = begin.after(period.mul_f64(published as f64));
             let mut now = clock::monotonic();
-            while now < due && !interrupted.load(Ordering::Relaxed) {
+            while now < due && !ended {
                 tap.wait(tap.bell(), due.since(now).min(Duration::from_millis(200)));
                 now = clock::monotonic();
+                ended = watch.end_said()?.is_some();
             }
         }
+        ended |= watch.end_said()?.is_some();
     }
-    let until = clock::monotonic().after(LINGER);
-    while clock::monotonic() < until && !interrupted.load(Ordering::Relaxed) {
-        tap.wait(tap.bell(), until.since(clock::monotonic()));
-    }
+    connect::linger(&tap, &mut watch)?;
     if common.json {
         show::json(&json!({ "topic": options.topic, "published": published }))?;
     } else {
-        show::line(&format!("published {published} on `{}`", options.topic))?;
+        let topic = show::harmless(&options.topic);
+        show::line(&format!("published {} on `{topic}`", show::count(published as usize, "message")))?;
     }
-    Ok(ExitCode::SUCCESS)
+    let all = options.count.is_none_or(|count| published >= count);
+    Ok(if all { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn content(options: &Options, description: &Description) -> Result<Content, Box<dyn Error>> {

@@ -1,13 +1,13 @@
 //! `board rate` and `board delay`: how often messages come, and how old they are when they do.
 
-use crate::{Common, Outcome, connect, show};
-use board::clock;
+use crate::connect::{self, Watch};
+use crate::{Common, EXIT_TIMEOUT, Outcome, show};
 use board::tap::{Tap, TapReader, now};
+use board::{arguments, clock};
 use messages::Time;
 use serde_json::{Value, json};
 use std::io::{self, IsTerminal as _};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 #[derive(Debug, clap::Args)]
@@ -15,8 +15,8 @@ pub(crate) struct RateOptions {
     /// The topics; without any, all.
     topics: Vec<String>,
     /// Seconds between two reports.
-    #[arg(long, value_name = "S", default_value_t = 1.0)]
-    interval: f64,
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = arguments::seconds)]
+    interval: Duration,
     /// End after so many reports.
     #[arg(short = 'n', long, value_name = "N")]
     count: Option<u64>,
@@ -27,11 +27,14 @@ pub(crate) struct DelayOptions {
     /// The topic.
     topic: String,
     /// Seconds between two reports.
-    #[arg(long, value_name = "S", default_value_t = 1.0)]
-    interval: f64,
+    #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = arguments::seconds)]
+    interval: Duration,
     /// End after so many messages.
     #[arg(short = 'n', long, value_name = "N")]
     count: Option<u64>,
+    /// End after so many seconds without a message, with exit code 3.
+    #[arg(long, value_name = "SECONDS", value_parser = arguments::seconds)]
+    timeout: Option<Duration>,
 }
 
 /// Longest sleep: how soon an interrupt is noticed.
@@ -81,8 +84,9 @@ struct Watched {
 }
 
 pub(crate) fn run(common: &Common, options: &RateOptions) -> Outcome {
-    let interrupted = connect::interrupted()?;
-    let tap = connect::join(common)?;
+    let place = connect::choose(common)?;
+    let mut ending = Watch::begin(place.clone())?;
+    let tap = connect::join(&place)?;
     let names: Vec<String> = if options.topics.is_empty() {
         tap.manifest().topics.iter().map(|topic| topic.name.clone()).collect()
     } else {
@@ -101,12 +105,11 @@ pub(crate) fn run(common: &Common, options: &RateOptions) -> Outcome {
             topic.periods.last = Some((envelope.stamp_ns, envelope.sequence));
         }
     }
-    let interval = Duration::from_secs_f64(options.interval.clamp(0.01, 3600.0));
     let mut reports = 0;
     let mut shown_lines = 0;
     while options.count.is_none_or(|count| reports < count) {
         let since = clock::monotonic();
-        let whole = watch(&tap, &mut watched, since.after(interval), &interrupted);
+        let whole = watch(&tap, &mut watched, since.after(options.interval), &mut ending)?;
         let passed_s = clock::monotonic().seconds_since(since);
         if !whole && reports > 0 {
             break;
@@ -120,8 +123,8 @@ pub(crate) fn run(common: &Common, options: &RateOptions) -> Outcome {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Takes messages in until the deadline; false when interrupted before it.
-fn watch(tap: &Tap, watched: &mut [Watched], deadline: Time, interrupted: &AtomicBool) -> bool {
+/// Takes messages in until the deadline; false when the command is to end before it.
+fn watch(tap: &Tap, watched: &mut [Watched], deadline: Time, ending: &mut Watch) -> io::Result<bool> {
     loop {
         let heard = tap.bell();
         for topic in watched.iter_mut() {
@@ -130,11 +133,11 @@ fn watch(tap: &Tap, watched: &mut [Watched], deadline: Time, interrupted: &Atomi
             }
         }
         let now = clock::monotonic();
-        if interrupted.load(Ordering::Relaxed) {
-            return false;
+        if ending.end_said()?.is_some() {
+            return Ok(false);
         }
         if now >= deadline {
-            return true;
+            return Ok(true);
         }
         tap.wait(heard, deadline.since(now).min(LOOK));
     }
@@ -160,7 +163,7 @@ fn report_rates(
         }));
         let shown = |index: usize| named(index).map_or("-".to_owned(), show::duration);
         table.add_row([
-            topic.name.clone(),
+            show::harmless(&topic.name),
             if rate_hz > 0.0 { format!("{} Hz", show::three(rate_hz)) } else { "-".into() },
             shown(0),
             shown(1),
@@ -176,7 +179,7 @@ fn report_rates(
     let text = table.trim_fmt();
     // Over the last report, where there is a screen to write on.
     if shown_lines > 0 && io::stdout().is_terminal() {
-        show::line(&format!("\x1b[{}A\x1b[J{text}", shown_lines))?;
+        show::line(&format!("\x1b[{shown_lines}A\x1b[J{text}"))?;
     } else {
         show::line(&text)?;
     }
@@ -184,20 +187,27 @@ fn report_rates(
 }
 
 pub(crate) fn run_delay(common: &Common, options: &DelayOptions) -> Outcome {
-    let interrupted = connect::interrupted()?;
-    let tap = connect::join(common)?;
-    connect::topic(tap.manifest(), &options.topic)?;
+    let place = connect::choose(common)?;
+    let mut watch = Watch::begin(place.clone())?;
+    let tap = connect::join(&place)?;
+    let (index, _) = connect::topic(tap.manifest(), &options.topic)?;
     let mut reader = tap.reader(&options.topic)?;
     // The last message has lain there for a while.
     tap.wait(tap.bell(), Duration::from_millis(20));
     while reader.next().is_some() {}
-    let interval = Duration::from_secs_f64(options.interval.clamp(0.01, 3600.0));
-    let mut next_report = clock::monotonic().after(interval);
+    let mut next_report = clock::monotonic().after(options.interval);
     let (mut published_ns, mut origin_ns) = (Vec::new(), Vec::new());
     let full = |seen: usize| options.count.is_some_and(|count| seen as u64 >= count);
-    while !interrupted.load(Ordering::Relaxed) && !full(published_ns.len()) {
+    let mut code = ExitCode::SUCCESS;
+    while !full(published_ns.len()) {
+        if watch.end_said()?.is_some() {
+            // Fewer than were asked for.
+            code = if options.count.is_some() { ExitCode::FAILURE } else { ExitCode::SUCCESS };
+            break;
+        }
         let heard = tap.bell();
         while let Some((envelope, _)) = reader.next() {
+            watch.heard();
             let now = now(tap.switchboard());
             published_ns.push(now.since(Time::from_nanos(envelope.stamp_ns)).as_nanos() as f64);
             origin_ns.push(now.since(Time::from_nanos(envelope.origin_ns)).as_nanos() as f64);
@@ -205,16 +215,21 @@ pub(crate) fn run_delay(common: &Common, options: &DelayOptions) -> Outcome {
                 break;
             }
         }
+        let waited = watch.wait(|| connect::awaited(&tap, index));
+        if options.timeout.is_some_and(|timeout| waited >= timeout) {
+            code = ExitCode::from(EXIT_TIMEOUT);
+            break;
+        }
         let now = clock::monotonic();
         // With a number of messages given there is one report, at the end.
         if now >= next_report && options.count.is_none() {
             report_delays(common, &options.topic, &published_ns, &origin_ns)?;
-            next_report = now.after(interval);
+            next_report = now.after(options.interval);
         }
         tap.wait(heard, next_report.since(now).clamp(Duration::from_millis(1), LOOK));
     }
     report_delays(common, &options.topic, &published_ns, &origin_ns)?;
-    Ok(ExitCode::SUCCESS)
+    Ok(code)
 }
 
 fn report_delays(common: &Common, topic: &str, published_ns: &[f64], origin_ns: &[f64]) -> io::Result<()> {
@@ -242,5 +257,6 @@ fn report_delays(common: &Common, topic: &str, published_ns: &[f64], origin_ns: 
         row.extend(values.map_or(vec!["-".to_owned(); 4], |values| values.map(show::duration).to_vec()));
         table.add_row(row);
     }
-    show::line(&format!("{} messages on {topic}\n{}", published_ns.len(), table.trim_fmt()))
+    let messages = show::count(published_ns.len(), "message");
+    show::line(&format!("{messages} on {}\n{}", show::harmless(topic), table.trim_fmt()))
 }

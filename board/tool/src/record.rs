@@ -1,18 +1,17 @@
 //! `board record`: every message into a file.
 
-use crate::connect;
-use crate::{Common, Outcome, show};
-use board::host::living_launcher;
-use board::place::Place;
+use crate::connect::{self, End, Watch};
+use crate::{Common, Outcome, output, show};
 use board::tap::{Tap, TapReader, now};
-use board::{Envelope, clock};
+use board::{Envelope, arguments, clock, manifest};
+use messages::Time;
 use recording::{Manifest, Recorder, Topic};
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::io::{self, IsTerminal as _, Write as _};
+use std::error::Error;
+use std::io::{self, IsTerminal as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 #[derive(Debug, clap::Args)]
@@ -26,37 +25,34 @@ pub(crate) struct Options {
     /// The services' health too.
     #[arg(long)]
     all: bool,
-    /// Overwrite the file if it exists.
+    /// Overwrite the file if it exists; anything but a plain file is left alone.
     #[arg(long)]
     force: bool,
     /// End after so many seconds.
-    #[arg(long, value_name = "S")]
-    duration: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = arguments::seconds)]
+    duration: Option<Duration>,
 }
 
 /// Longest sleep: how soon an interrupt is noticed, and a chunk closed when no message comes.
 const LOOK: Duration = Duration::from_millis(100);
-/// How often it is looked whether the board is still up.
-const ALIVE: Duration = Duration::from_millis(500);
+/// How often it is looked for new topics, and said what was lost.
+const SECOND: Duration = Duration::from_secs(1);
 
 pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
-    let interrupted = connect::interrupted()?;
     let place = connect::choose(common)?;
-    let tap = connect::join(common)?;
-    let topics = chosen(&tap, options)?;
-    if options.force {
-        match std::fs::remove_file(&options.output) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                return Err(format!("{}: {error}", options.output.display()).into());
-            }
-            _ => {}
+    let watch = Watch::begin(place.clone())?;
+    let tap = connect::join(&place)?;
+    for pattern in &options.topics {
+        if !tap.manifest().topics.iter().any(|topic| matches(pattern, &topic.name)) {
+            connect::topic(tap.manifest(), pattern)?;
         }
     }
     let board = tap.manifest();
+    let chosen: Vec<&manifest::Topic> = board.topics.iter().filter(|topic| options.wants(topic)).collect();
     let manifest = Manifest {
         graph: board.graph.clone(),
         seed: board.seed,
-        topics: topics.iter().map(|&index| entry(&board.topics[index])).collect(),
+        topics: chosen.iter().map(|topic| entry(topic)).collect(),
         notes: [
             ("board".to_owned(), place.name().to_owned()),
             // Messages that are older lay on the board when the recording began.
@@ -64,52 +60,40 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
         ]
         .into(),
     };
-    let recorder = Recorder::new(&options.output, &manifest).map_err(|error| match error {
-        recording::RecordingError::Io { cause, .. } if cause.kind() == io::ErrorKind::AlreadyExists => {
-            format!("{} exists; say --force to overwrite it", options.output.display()).into()
-        }
-        other => Box::<dyn std::error::Error>::from(other),
-    })?;
-    let open = |topic: &Topic| {
-        let reader = tap.reader(&topic.name)?;
-        Ok::<_, board::JoinError>(Source { topic: topic.name.clone(), reader, sequence: None, lost: 0 })
-    };
-    let sources = manifest.topics.iter().map(open).collect::<Result<Vec<_>, _>>()?;
-    let session = Session { tap: &tap, place: &place, recorder, sources };
-    session.run(common, options, &interrupted)
+    output::make_way(&options.output, options.force)?;
+    let recorder = Recorder::new(&options.output, &manifest)?;
+    let begin = clock::monotonic();
+    let mut session =
+        Session { recorder, sources: Vec::new(), begin, looked: begin, said: 0, watch, tap, options };
+    for topic in manifest.topics {
+        session.open(topic.name)?;
+    }
+    session.run(common)
 }
 
-fn entry(topic: &board::manifest::Topic) -> Topic {
+impl Options {
+    fn wants(&self, topic: &manifest::Topic) -> bool {
+        if self.topics.is_empty() {
+            return self.all || !topic.name.starts_with("health/");
+        }
+        self.topics.iter().any(|pattern| matches(pattern, &topic.name))
+    }
+}
+
+fn matches(pattern: &str, name: &str) -> bool {
+    match pattern.strip_suffix('*') {
+        Some(subject) => name.starts_with(subject),
+        None => pattern == name,
+    }
+}
+
+fn entry(topic: &manifest::Topic) -> Topic {
     Topic {
         name: topic.name.clone(),
         publisher: topic.publisher.clone(),
         depth: topic.depth,
         message: topic.message.clone(),
     }
-}
-
-/// The places of the chosen topics, in the board's order.
-fn chosen(tap: &Tap, options: &Options) -> Result<Vec<usize>, connect::ConnectError> {
-    let manifest = tap.manifest();
-    let mut wanted = vec![false; manifest.topics.len()];
-    if options.topics.is_empty() {
-        for (index, topic) in manifest.topics.iter().enumerate() {
-            wanted[index] = options.all || !topic.name.starts_with("health/");
-        }
-    }
-    for name in &options.topics {
-        let Some(subject) = name.strip_suffix('*') else {
-            wanted[connect::topic(manifest, name)?.0 as usize] = true;
-            continue;
-        };
-        let mut matching =
-            (0..wanted.len()).filter(|&index| manifest.topics[index].name.starts_with(subject)).peekable();
-        if matching.peek().is_none() {
-            connect::topic(manifest, name)?;
-        }
-        matching.for_each(|index| wanted[index] = true);
-    }
-    Ok((0..wanted.len()).filter(|&index| wanted[index]).collect())
 }
 
 /// A topic that is recorded.
@@ -121,49 +105,59 @@ struct Source {
 }
 
 struct Session<'a> {
-    tap: &'a Tap,
-    place: &'a Place,
     recorder: Recorder,
+    /// In the order of the recording's topics.
     sources: Vec<Source>,
+    begin: Time,
+    looked: Time,
+    /// Messages that were said to be lost.
+    said: u64,
+    watch: Watch,
+    tap: Tap,
+    options: &'a Options,
 }
 
 impl Session<'_> {
-    fn run(mut self, common: &Common, options: &Options, interrupted: &AtomicBool) -> Outcome {
-        let begin = clock::monotonic();
-        let end =
-            options.duration.map(|seconds| begin.after(Duration::from_secs_f64(seconds.clamp(0.0, 1e9))));
-        let (mut looked, mut shown) = (begin, begin);
-        let mut board_went = false;
+    fn open(&mut self, topic: String) -> Result<(), board::JoinError> {
+        let reader = self.tap.reader(&topic)?;
+        self.sources.push(Source { topic, reader, sequence: None, lost: 0 });
+        Ok(())
+    }
+
+    fn run(mut self, common: &Common) -> Outcome {
+        let end = self.options.duration.map(|duration| self.begin.after(duration));
+        let mut shown = self.begin;
         let shows = io::stderr().is_terminal() && !common.json;
-        loop {
+        let why = loop {
             let heard = self.tap.bell();
             let found = self.drain()?;
             let now = clock::monotonic();
             self.recorder.tick(now)?;
             if shows && now.since(shown) >= Duration::from_millis(200) {
                 shown = now;
-                let _ = write!(io::stderr(), "\r\x1b[K{}", self.progress(now.since(begin)));
+                show::progress(&self.progress(now));
             }
-            if interrupted.load(Ordering::Relaxed) || end.is_some_and(|end| now >= end) {
-                break;
+            if now.since(self.looked) >= SECOND {
+                self.looked = now;
+                self.follow()?;
+                self.say_lost(shows);
             }
-            if now.since(looked) >= ALIVE {
-                looked = now;
-                if living_launcher(self.place).is_none() {
-                    board_went = true;
-                    break;
-                }
+            if let Some(why) = self.watch.end()? {
+                break why;
+            }
+            if end.is_some_and(|end| now >= end) {
+                break End::Asked;
             }
             if !found {
                 self.tap.wait(heard, LOOK);
             }
-        }
+        };
         // What came between the last look and the end.
         self.drain()?;
         if shows {
-            let _ = write!(io::stderr(), "\r\x1b[K");
+            show::progress("");
         }
-        self.finish(common, options, clock::monotonic().since(begin), board_went)
+        self.finish(common, why == End::BoardWent)
     }
 
     /// Records what is there; whether there was anything.
@@ -182,51 +176,83 @@ impl Session<'_> {
         Ok(found)
     }
 
+    /// Records topics that were added to the board since, as a swap or a shadow does.
+    fn follow(&mut self) -> Result<(), Box<dyn Error>> {
+        for index in self.tap.refresh()? {
+            let topic = &self.tap.manifest().topics[index];
+            if self.options.wants(topic) {
+                let topic = entry(topic);
+                self.recorder.add_topic(&topic)?;
+                self.open(topic.name)?;
+            }
+        }
+        Ok(())
+    }
+
     fn lost(&self) -> u64 {
         self.sources.iter().map(|source| source.lost).sum()
     }
 
-    fn progress(&self, passed: Duration) -> String {
-        let counts = self.recorder.counts();
+    /// Says at once that the recording has holes, and where.
+    fn say_lost(&mut self, shows: bool) {
+        let lost = self.lost();
+        if lost == self.said {
+            return;
+        }
+        self.said = lost;
+        if shows {
+            show::progress("");
+        }
+        show::note(&self.lost_in_words());
+    }
+
+    fn lost_in_words(&self) -> String {
+        let lost = self.sources.iter().filter(|source| source.lost > 0);
+        let topics: Vec<String> = lost.map(|source| format!("`{}` {}", source.topic, source.lost)).collect();
+        let number = show::count(self.lost() as usize, "message");
+        format!("{number} overwritten before they could be recorded: {}", topics.join(", "))
+    }
+
+    fn progress(&self, now: Time) -> String {
+        let messages = show::count(self.recorder.counts().messages as usize, "message");
         let lost = match self.lost() {
             0 => String::new(),
             lost => format!(", {lost} lost"),
         };
         let size = show::bytes(self.recorder.file_bytes());
-        format!("{:.1} s: {} messages, {size}{lost}", passed.as_secs_f64(), counts.messages)
+        format!("{:.1} s: {messages}, {size}{lost}", now.seconds_since(self.begin))
     }
 
-    fn finish(mut self, common: &Common, options: &Options, passed: Duration, board_went: bool) -> Outcome {
+    fn finish(mut self, common: &Common, board_went: bool) -> Outcome {
         let lost: BTreeMap<&str, u64> = self
             .sources
             .iter()
             .filter(|source| source.lost > 0)
             .map(|source| (source.topic.as_str(), source.lost))
             .collect();
-        self.recorder.note(recording::LOST_NOTE, &json!(lost).to_string());
-        let total = self.lost();
-        let words: Vec<String> = lost.iter().map(|(topic, lost)| format!("`{topic}` {lost}")).collect();
-        let progress = self.progress(passed);
         let lost = json!(lost);
+        self.recorder.note(recording::LOST_NOTE, &lost.to_string());
+        let now = clock::monotonic();
+        let (progress, total, words) = (self.progress(now), self.lost(), self.lost_in_words());
         let counts = self.recorder.finish()?;
-        let bytes = std::fs::metadata(&options.output)?.len();
+        let output = &self.options.output;
+        let bytes = std::fs::metadata(output)?.len();
         if common.json {
             show::json(&json!({
-                "file": options.output, "messages": counts.messages, "misfits": counts.misfits, "bytes": bytes,
-                "seconds": passed.as_secs_f64(), "lost": lost, "board_went_down": board_went,
+                "file": output, "messages": counts.messages, "misfits": counts.misfits, "bytes": bytes,
+                "seconds": now.seconds_since(self.begin), "lost": lost, "board_went_down": board_went,
             }))?;
         } else {
             let why = if board_went { "the board went down; " } else { "" };
-            show::line(&format!("{why}{} ({}): {progress}", options.output.display(), show::bytes(bytes)))?;
+            let file = show::harmless(&output.display().to_string());
+            show::line(&format!("{why}{file} ({}): {progress}", show::bytes(bytes)))?;
         }
         if counts.misfits > 0 {
-            eprintln!("{} messages did not fit their type; other tools will not show them", counts.misfits);
+            let misfits = show::count(counts.misfits as usize, "message");
+            show::note(&format!("{misfits} did not fit their type; other tools will not show them"));
         }
         if total > 0 {
-            eprintln!(
-                "{total} messages were overwritten before they could be recorded: {}",
-                words.join(", ")
-            );
+            show::note(&words);
         }
         Ok(ExitCode::SUCCESS)
     }

@@ -1,16 +1,15 @@
 //! `board replay`: a recording onto a running board.
 
-use crate::connect::{self, Life, publisher_life};
+use crate::connect::{self, Watch, who_obeys};
 use crate::{Common, Outcome, show};
-use board::clock;
 use board::tap::{Tap, TapPublisher};
+use board::{arguments, clock};
 use recording::Recording;
 use serde_json::json;
 use std::error::Error;
-use std::io::{self, IsTerminal as _, Write as _};
+use std::io::{self, IsTerminal as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 #[derive(Debug, clap::Args)]
@@ -27,13 +26,11 @@ pub(crate) struct Options {
     /// Begin again at the end, until Ctrl-C.
     #[arg(long = "loop")]
     repeat: bool,
-    /// Publish beside services that publish these topics.
+    /// Publish where services publish, or where some listen that move the robot.
     #[arg(long)]
     force: bool,
 }
 
-/// Readers find a publisher when they next look, and get nothing from one that has left before.
-const LINGER: Duration = Duration::from_millis(300);
 /// Longest sleep: how soon an interrupt is noticed.
 const LOOK: Duration = Duration::from_millis(200);
 
@@ -47,47 +44,47 @@ enum ReplayError {
     #[error("topic `{topic}` was recorded with another layout: {difference}")]
     Layout { topic: String, difference: String },
     #[error(
-        "living services publish {}; the recording would mix with their messages, and whoever obeys them might move. \
-         Stop them, choose other topics with --topics, or say --force to publish beside them",
-        topics.join(", ")
+        "{}: whoever obeys the recording's messages might move. Stop them, choose other topics with --topics, or say --force to publish \
+         all the same",
+        reasons.join("; ")
     )]
-    Alive { topics: Vec<String> },
+    Obeyed { reasons: Vec<String> },
 }
 
 fn speed(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        _ if text == "max" => Ok(f64::INFINITY),
-        Ok(speed) if speed > 0.0 => Ok(speed),
-        _ => Err("a number above zero, or `max`".to_owned()),
+    if text == "max" {
+        return Ok(f64::INFINITY);
     }
+    arguments::positive(text).map_err(|error| format!("{error}, or `max`"))
 }
 
 pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
-    let interrupted = connect::interrupted()?;
     let recording = Recording::open(&options.file)?;
-    let mut tap = connect::join(common)?;
+    let place = connect::choose(common)?;
+    let mut watch = Watch::begin(place.clone())?;
+    let mut tap = connect::join(&place)?;
     let publishers = publishers(&recording, &mut tap, options)?;
     if !recording.is_complete() {
-        eprintln!("{} was cut; it is replayed up to its last whole chunk", options.file.display());
+        show::note(&format!("{} was cut; it is replayed up to its last whole chunk", options.file.display()));
     }
     // Readers that were there before us find us first.
-    linger(&tap, &interrupted);
+    connect::linger(&tap, &mut watch)?;
     let mut published = 0;
     let mut damaged = 0;
     loop {
-        let (messages, errors) = play(&recording, &tap, &publishers, common, options, &interrupted)?;
+        let (messages, errors) = play(&recording, &tap, &publishers, common, options, &mut watch)?;
         published += messages;
         damaged += errors;
-        if !options.repeat || messages == 0 || interrupted.load(Ordering::Relaxed) {
+        if !options.repeat || messages == 0 || watch.end()?.is_some() {
             break;
         }
     }
-    linger(&tap, &interrupted);
+    connect::linger(&tap, &mut watch)?;
     if common.json {
         show::json(&json!({ "file": options.file, "published": published, "damaged_chunks": damaged }))?;
     } else {
-        let topics = publishers.iter().flatten().count();
-        show::line(&format!("published {published} messages on {topics} topics"))?;
+        let topics = show::count(publishers.iter().flatten().count(), "topic");
+        show::line(&format!("published {} on {topics}", show::count(published as usize, "message")))?;
     }
     Ok(if damaged > 0 { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }
@@ -111,7 +108,7 @@ fn publishers(
         }
     }
     let mut names = Vec::new();
-    let mut alive = Vec::new();
+    let mut reasons = Vec::new();
     for topic in recording.topics() {
         let wanted = if options.topics.is_empty() {
             !topic.name.starts_with("health/")
@@ -123,19 +120,15 @@ fn publishers(
             if let Some(difference) = topic.message.first_difference(&here.message) {
                 return Err(ReplayError::Layout { topic: topic.name.clone(), difference }.into());
             }
-            if let Some(publisher) = &here.publisher
-                && publisher_life(tap.switchboard(), index) == Life::Lives
-            {
-                alive.push(format!("`{}` (`{publisher}`)", topic.name));
-            }
+            reasons.extend(who_obeys(tap.manifest(), tap.switchboard(), index));
         }
         names.push(found.map(|_| topic.name.clone()));
     }
     if names.iter().all(Option::is_none) {
         return Err(ReplayError::NothingInCommon { file, topics: known() }.into());
     }
-    if !alive.is_empty() && !options.force {
-        return Err(ReplayError::Alive { topics: alive }.into());
+    if !reasons.is_empty() && !options.force {
+        return Err(ReplayError::Obeyed { reasons }.into());
     }
     let open = |name: Option<String>| name.map(|name| tap.publisher(&name)).transpose();
     Ok(names.into_iter().map(open).collect::<Result<_, _>>()?)
@@ -148,7 +141,7 @@ fn play(
     publishers: &[Option<TapPublisher>],
     common: &Common,
     options: &Options,
-    interrupted: &AtomicBool,
+    watch: &mut Watch,
 ) -> Result<(u64, u64), Box<dyn Error>> {
     let shows = io::stderr().is_terminal() && !common.json;
     // What lay on the board when the recording began is published at once, however old it was.
@@ -163,7 +156,7 @@ fn play(
         let message = match message {
             Ok(message) => message,
             Err(error) => {
-                eprintln!("{error}");
+                show::note(&error.to_string());
                 damaged += 1;
                 continue;
             }
@@ -172,11 +165,13 @@ fn play(
         let passed_ns = stamp_ns.saturating_sub(*first_ns.get_or_insert(stamp_ns));
         let due = begin.after(Duration::from_nanos((passed_ns as f64 / options.speed) as u64));
         let mut now = clock::monotonic();
-        while now < due && !interrupted.load(Ordering::Relaxed) {
+        let mut ended = watch.end_said()?.is_some();
+        while now < due && !ended {
             tap.wait(tap.bell(), due.since(now).min(LOOK));
             now = clock::monotonic();
+            ended = watch.end_said()?.is_some();
         }
-        if interrupted.load(Ordering::Relaxed) {
+        if ended {
             break;
         }
         if let Some(publisher) = &publishers[message.topic] {
@@ -185,18 +180,11 @@ fn play(
         }
         if shows && now.since(shown) >= LOOK {
             shown = now;
-            let _ = write!(io::stderr(), "\r\x1b[K{:.1} s: {published} messages", passed_ns as f64 * 1e-9);
+            show::progress(&format!("{:.1} s: {published} messages", passed_ns as f64 * 1e-9));
         }
     }
     if shows {
-        let _ = write!(io::stderr(), "\r\x1b[K");
+        show::progress("");
     }
     Ok((published, damaged))
-}
-
-fn linger(tap: &Tap, interrupted: &AtomicBool) {
-    let until = clock::monotonic().after(LINGER);
-    while clock::monotonic() < until && !interrupted.load(Ordering::Relaxed) {
-        tap.wait(tap.bell(), until.since(clock::monotonic()));
-    }
 }

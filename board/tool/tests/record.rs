@@ -1,56 +1,11 @@
 //! `board record` and `board replay` with a board that is up.
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
-use board::host::Host;
-use board::manifest::{Manifest, Topic};
+mod support;
+
 use board::tap::Tap;
-use messages::{Message as _, Order, Path, WheelSpeeds};
 use recording::Recording;
-use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
-
-fn host(name: &str) -> Host {
-    let topic = |name: &str, message| Topic {
-        name: name.into(),
-        publisher: Some("somebody".into()),
-        readers: vec![],
-        depth: 64,
-        message,
-    };
-    let topics = vec![
-        topic("wheels/desired", WheelSpeeds::description()),
-        topic("plan/path", Path::description()),
-        topic("mission/order", Order::description()),
-        topic("health/somebody", messages::Health::description()),
-    ];
-    Host::create(name, Manifest { graph: "test".into(), seed: 5, topics, ..Manifest::default() }, false)
-        .unwrap()
-}
-
-fn tool(board: &str, arguments: &[&str]) -> Child {
-    Command::new(env!("CARGO_BIN_EXE_board"))
-        .args(["--board", board, "--json"])
-        .args(arguments)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap()
-}
-
-#[track_caller]
-fn succeeds(child: Child) -> serde_json::Value {
-    let Output { status, stdout, stderr } = child.wait_with_output().unwrap();
-    assert!(status.success(), "{}", String::from_utf8_lossy(&stderr));
-    serde_json::from_slice(&stdout).unwrap()
-}
-
-fn wait_for(mut condition: impl FnMut() -> bool) {
-    let deadline = board::clock::monotonic().after(Duration::from_secs(20));
-    while !condition() {
-        assert!(board::clock::monotonic() < deadline, "nothing happened for 20 s");
-        board::clock::sleep(Duration::from_millis(5));
-    }
-}
+use support::{host, succeeds, tool, wait_for};
 
 #[test]
 fn what_was_recorded_is_replayed_to_the_byte() {

@@ -124,7 +124,10 @@ fn is_executable(path: &Path) -> bool {
 
 /// Runs a command to its end, or until its time is up.
 fn run_for_a_while(command: &mut Command) -> Result<Output, QueryError> {
-    let broken = |what: &str, error: std::io::Error| QueryError::Broken(format!("{what}: {error}"));
+    let broken = |what: &str, error: std::io::Error| {
+        let lack = board::Lack::behind(&error).map(|lack| format!(" ({lack})")).unwrap_or_default();
+        QueryError::Broken(format!("{what}: {error}{lack}"))
+    };
     // A group of its own, so that whatever it started ends with it.
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
     let mut child = command.spawn().map_err(|error| broken("it cannot be started", error))?;

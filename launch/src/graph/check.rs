@@ -105,6 +105,9 @@ pub(crate) struct CheckedTopic {
     pub(crate) fingerprint: String,
     /// How many messages the deepest of its ports holds.
     pub(crate) depth: usize,
+    /// For messages with elements: for how many there is room from the start.
+    #[serde(default)]
+    pub(crate) elements: usize,
 }
 
 /// Who publishes a topic.

@@ -62,6 +62,7 @@ fn port(direction: Direction, topic: &str, message: Description, required: bool)
         direction,
         required,
         depth: 4,
+        elements: 0,
         wakes: false,
         fingerprint: format!("{:016x}", message.fingerprint()),
         message,

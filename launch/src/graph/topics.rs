@@ -5,6 +5,7 @@ use super::problem::{Problem, Problems};
 use super::settings::{Graph, ServiceTable};
 use super::source::Place;
 use super::suggest::nearest;
+use board::manifest::ELEMENTS;
 use board::{Direction, Interface, PortDescription};
 use messages::{Message as _, RunSummary};
 use std::collections::BTreeMap;
@@ -236,5 +237,6 @@ fn checked(graph: &Graph, topic: &str, ports: &Ports<'_>) -> Option<CheckedTopic
         message: first.description.message.clone(),
         fingerprint: first.description.fingerprint.clone(),
         depth: depths.max().unwrap_or(1).max(1),
+        elements: ports.publishers.iter().map(|port| port.description.elements).max().unwrap_or(ELEMENTS),
     })
 }

@@ -6,13 +6,14 @@ use super::plan::Plan;
 use super::scene::SceneReader;
 use super::snapshot::Snapshot;
 use super::terminal::{Ready, can_show, wait_for_keys};
-use crate::console::{Console, harmless};
+use crate::console::Console;
 use crate::control::{self, Answer, Request, Status};
 use crate::journal;
 use crate::order;
 use crate::signals::{self, Alarm};
 use board::clock;
 use board::place::Place;
+use board::terminal::harmless;
 use crossterm::event::{self, Event};
 use geometry::World;
 use ratatui::DefaultTerminal;
@@ -172,7 +173,7 @@ impl View<'_> {
         let status = match control::ask_within(self.place, &Request::Status, ANSWER_WITHIN) {
             Ok(Answer::Status(status)) => *status,
             Ok(_) => return Err("the launcher answers something else".to_owned()),
-            Err(error) if board::host::living_launcher(self.place).is_none() => return Err(error),
+            Err(error) if control::is_up(self.place) == Ok(false) => return Err(error),
             // It is just coming up.
             Err(_) if self.last.is_none() => return Ok(()),
             Err(error) => {

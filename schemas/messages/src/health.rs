@@ -31,7 +31,7 @@ pub struct Health {
     pub step_max_ns: u64,
     /// Steps since the start that began more than a period late.
     pub late_steps: u64,
-    /// Messages lost by overflow since the start.
+    /// Messages lost since the start: overwritten before they were read, or not sent for want of memory.
     pub lost_messages: u64,
     /// Messages since the start that could not be read as what they claim to be.
     pub invalid_messages: u64,
