@@ -43,7 +43,7 @@ use trail::Trail;
 /// A command that leads too near to something is tried so much slower, one after the other.
 const SHARES: [f64; 6] = [1.0, 0.75, 0.5, 0.3, 0.15, 0.07];
 /// What the guard's side radius keeps free, and a little: so the guard need not stop the robot for what the driver can see coming.
-const OFF_SIDES_M: f64 = 0.010;
+const OFF_SIDES_M: f64 = 0.030;
 
 /// What the driver looks at.
 #[derive(Debug, Clone, Copy, Default)]

@@ -14,23 +14,37 @@ use std::f64::consts::FRAC_PI_2;
 const TOLD_WITHIN_M: f64 = 0.6;
 /// So many points are told at most, the nearest ones.
 const TOLD_MAX: usize = 256;
+const TOLD_APART_M: f32 = 0.02;
 /// In another frame, or after an unseen journey, places mean nothing.
 const JUMP_M: f64 = 0.5;
 
-/// Ends of readings from which walls are made out: so many, so old, so far apart.
+/// A reading may have ended at the rim of the sensor's view, half of which has this slope, if it is so near; and one that passes, so far
+/// aside, was not hindered there.
+const RIM_SLOPES: [f64; 4] = [-0.22, -0.15, 0.15, 0.22];
+const RIM_WITHIN_M: f64 = 0.6;
+const RIM_SEEN_SLOPE: f64 = 0.19;
+
+/// Ends of readings from which walls are made out: so many, so far apart. Of two that are nearer the mean is taken, with so much weight for
+/// the newer one.
 const ENDS_MAX: usize = 160;
-const ENDS_KEPT_S: f64 = 5.0;
 const ENDS_APART_M: f64 = 0.015;
-/// Ends this near to each other make a wall if so many lie on a line, within so much of it, over such a length.
+const ENDS_NEWS: f64 = 0.2;
+/// A reading ends at a wall if so many ends nearby lie on one line with it, within so much of it, over such a length.
 const WALL_WITHIN_M: f64 = 0.35;
 const WALL_ENDS: usize = 4;
-const WALL_THICK_M: f64 = 0.025;
+const WALL_THICK_M: f64 = 0.015;
 const WALL_LENGTH_M: f64 = 0.12;
-/// A wall goes on for so long beyond the end of a reading, in points so far apart.
+const WALL_SHARE: f64 = 0.6;
+/// A wall beside the robot goes on for so long beyond the end of a reading; one in front of it only beyond the outermost sensors, which
+/// sit so near to the hull's sides. In points so far apart.
 const WALL_GOES_ON_M: f64 = 0.45;
+const CORNER_GOES_ON_M: f64 = 0.25;
+const OUTERMOST_M: f64 = 0.10;
 const WALL_STEP_M: f64 = 0.04;
 /// A wall that is met askew reads too far by up to this, as the sensors' cones see more of what lies farther away.
 const ASSUMED_NEARER_M: f64 = 0.015;
+/// What was assumed a moment ago still holds: of many readings, each with its error, the one that leaves the least room.
+const ASSUMED_S: f64 = 1.0;
 /// What is assumed does not reach nearer to the hull than this: the robot stands there.
 const ASSUMED_OFF_M: f64 = 0.02;
 /// Walls of the map count while the pose is known so well (one standard deviation).
@@ -50,6 +64,9 @@ struct End {
     side: i8,
     /// From where it was seen.
     eye: Point2<f64>,
+    /// The edge of the hull out of which it was seen: along it a wall goes on, so far back and ahead, where no other sensor looks.
+    axis: Vector2<f64>,
+    goes_on_m: [f64; 2],
 }
 
 /// What is near.
@@ -58,8 +75,10 @@ pub(crate) struct Near {
     sightings: Sightings,
     /// Where the middles of readings have ended.
     ends: Vec<End>,
+    /// Where else a front sensor's reading may have ended, at the rim of its view: when that is narrower it will know.
+    rims: Sightings,
     /// Walls beyond the ends of what was seen of them.
-    assumed: Vec<Point2<f64>>,
+    assumed: Vec<(Time, Point2<f64>)>,
     place: Option<Pose2>,
     /// The walls of each floor of the map, and those points of them that are near now.
     floors: Vec<(i32, Vec<Segment>)>,
@@ -89,17 +108,35 @@ impl Near {
         let looks = ranges.looks(here);
         for (eye, range_m) in looks.clone() {
             self.sightings.see_through(eye, range_m, TOF_SLOPE);
+            self.rims.see_through(eye, range_m, RIM_SEEN_SLOPE);
         }
         let near = looks.clone().filter(|(_, range_m)| *range_m < SEEN_WITHIN_M);
-        let feet = near.clone().map(|(eye, range_m)| End {
-            seen: now,
-            place: eye.transform(Point2::new(range_m, 0.0)),
-            side: (angle::difference(eye.heading_rad, here.heading_rad) / FRAC_PI_2).round() as i8,
-            eye: eye.position(),
+        let feet = near.clone().map(|(eye, range_m)| {
+            let side = (angle::difference(eye.heading_rad, here.heading_rad) / FRAC_PI_2).round() as i8;
+            let along_rad = if side == 0 { here.heading_rad + FRAC_PI_2 } else { here.heading_rad };
+            let outer_m = hull.side_m - OUTERMOST_M;
+            let goes_on_m = match here.inverse_transform(eye.position()).y {
+                _ if side != 0 => [WALL_GOES_ON_M; 2],
+                y_m if y_m > outer_m => [0.0, CORNER_GOES_ON_M],
+                y_m if y_m < -outer_m => [CORNER_GOES_ON_M, 0.0],
+                _ => [0.0; 2],
+            };
+            End {
+                seen: now,
+                place: eye.transform(Point2::new(range_m, 0.0)),
+                side,
+                eye: eye.position(),
+                axis: Vector2::new(along_rad.cos(), along_rad.sin()),
+                goes_on_m,
+            }
         });
         let feet: Vec<End> = feet.collect();
         for (eye, range_m) in near {
             self.sightings.add_reading(now, eye, range_m);
+            let is_in_front = (eye.heading_rad - here.heading_rad).abs() < 0.1;
+            for slope in RIM_SLOPES.into_iter().filter(|_| is_in_front && range_m < RIM_WITHIN_M) {
+                self.rims.add(now, eye.transform(Point2::new(range_m, slope * range_m)));
+            }
         }
         self.assume(&feet);
         let seen_past = |place: &Point2<f64>| {
@@ -108,8 +145,11 @@ impl Near {
                 seen.x > 0.0 && seen.x < range_m - ENDS_APART_M && seen.y.abs() <= TOF_SLOPE * seen.x
             })
         };
-        self.assumed
-            .retain(|place| hull.distance_m(here, *place) > ASSUMED_OFF_M && !seen_past(place));
+        self.assumed.retain(|(seen, place)| {
+            now.seconds_since(*seen) <= ASSUMED_S
+                && hull.distance_m(here, *place) > ASSUMED_OFF_M
+                && !seen_past(place)
+        });
     }
 
     /// Takes in a laser's scan, which shows walls as far as they go.
@@ -154,17 +194,22 @@ impl Near {
     pub(crate) fn tell(&mut self, motion: Option<Motion>, hull: &Hull) -> (Option<Pose2>, &[NearPoint]) {
         self.points.clear();
         let Some(here) = motion.map(|motion| motion.pose) else { return (None, &self.points) };
-        let seen = self.sightings.iter().map(|sighting| sighting.place);
-        let places = seen.chain(self.assumed.iter().copied()).chain(self.walls.iter().copied());
+        let seen = self.sightings.iter().chain(self.rims.iter()).map(|sighting| sighting.place);
+        let places = seen.chain(self.assumed.iter().map(|(_, place)| *place)).chain(self.walls.iter().copied());
         let local = places.map(|place| here.inverse_transform(place));
         let mut near: Vec<(f64, Point2<f64>)> = local
             .map(|place| (hull.distance_to_m(place), place))
             .filter(|(distance_m, _)| (1e-9..TOLD_WITHIN_M).contains(distance_m))
             .collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        near.truncate(TOLD_MAX);
-        let point = |(_, place): (f64, Point2<f64>)| NearPoint { x_m: place.x as f32, y_m: place.y as f32 };
-        self.points.extend(near.into_iter().map(point));
+        for (_, place) in near {
+            let point = NearPoint { x_m: place.x as f32, y_m: place.y as f32 };
+            // The nearest first: what lies beside it tells no more.
+            let is_news = |told: &NearPoint| (told.x_m - point.x_m).hypot(told.y_m - point.y_m) >= TOLD_APART_M;
+            if self.points.len() < TOLD_MAX && self.points.iter().all(is_news) {
+                self.points.push(point);
+            }
+        }
         (Some(here), &self.points)
     }
 
@@ -173,12 +218,13 @@ impl Near {
         let here = motion?.pose;
         if self.place.replace(here).is_some_and(|last| last.distance_m(here) > JUMP_M) {
             self.sightings.clear();
+            self.rims.clear();
             self.ends.clear();
+            self.assumed.clear();
         }
         self.sightings.forget(now, here, hull, 0.0);
-        self.ends.retain(|end| {
-            now.seconds_since(end.seen) <= ENDS_KEPT_S && hull.distance_m(here, end.place) < SEEN_WITHIN_M
-        });
+        self.rims.forget(now, here, hull, 0.0);
+        self.ends.retain(|end| hull.distance_m(here, end.place) < SEEN_WITHIN_M);
         Some(here)
     }
 
@@ -190,23 +236,28 @@ impl Near {
             // When there is no room, the oldest makes some.
             let known = self.ends.iter().position(is_known);
             match known.or_else(|| if self.ends.len() < ENDS_MAX { None } else { oldest() }) {
-                Some(index) => self.ends[index] = *foot,
+                Some(index) => {
+                    // A robot at rest sees the same place again and again: the mean counts.
+                    let place = self.ends[index].place;
+                    self.ends[index] = End { place: place + (foot.place - place) * ENDS_NEWS, ..*foot };
+                }
                 None => self.ends.push(*foot),
             }
         }
-        self.assumed.clear();
         for foot in feet {
             let is_near = |end: &&End| end.side == foot.side && (end.place - foot.place).norm() <= WALL_WITHIN_M;
-            let Some(along) = line(self.ends.iter().filter(is_near).map(|end| end.place)) else { continue };
+            let near: Vec<Point2<f64>> = self.ends.iter().filter(is_near).map(|end| end.place).collect();
+            let Some((middle, along)) = line_through(foot.place, &near) else { continue };
             // Towards the robot.
             let across = Vector2::new(-along.y, along.x);
-            let nearer = across * (ASSUMED_NEARER_M * across.dot(&(foot.eye - foot.place)).signum());
-            let steps = (WALL_GOES_ON_M / WALL_STEP_M) as i32;
-            for step in (-steps..=steps).filter(|step| *step != 0) {
-                let place = foot.place + nearer + along * (WALL_STEP_M * f64::from(step));
-                if self.assumed.iter().all(|known| (known - place).norm() >= 0.75 * WALL_STEP_M) {
-                    self.assumed.push(place);
-                }
+            let nearer = across * (ASSUMED_NEARER_M * across.dot(&(foot.eye - middle)).signum());
+            let begin = middle + nearer + along * along.dot(&(foot.place - middle));
+            let steps = |length_m: f64| (length_m / WALL_STEP_M) as i32;
+            let [back_m, ahead_m] = foot.goes_on_m;
+            // Along the hull's side: ahead is where the hull's x axis or, across its front, its y axis points.
+            let sign = along.dot(&foot.axis).signum();
+            for step in (-steps(back_m)..=steps(ahead_m)).filter(|step| *step != 0) {
+                self.assumed.push((foot.seen, begin + along * (sign * WALL_STEP_M * f64::from(step))));
             }
         }
     }
@@ -218,8 +269,22 @@ fn is_sure(pose: &PoseEstimate) -> bool {
     (0.0..=SURE_M * SURE_M).contains(&variance_m2) && (0.0..=SURE_RAD * SURE_RAD).contains(&pose.covariance[8])
 }
 
-/// The direction of the line on which all these points lie, if they do: their principal axis.
-fn line(points: impl Iterator<Item = Point2<f64>> + Clone) -> Option<Vector2<f64>> {
+/// The middle and the direction of the line through a place on which most of the points lie, if enough of them do.
+fn line_through(place: Point2<f64>, points: &[Point2<f64>]) -> Option<(Point2<f64>, Vector2<f64>)> {
+    let on = |middle: Point2<f64>, along: Vector2<f64>| {
+        let across = Vector2::new(-along.y, along.x);
+        points.iter().filter(move |point| across.dot(&(**point - middle)).abs() <= WALL_THICK_M)
+    };
+    let directions = points.iter().map(|point| point - place).filter(|way| way.norm() >= 0.5 * WALL_LENGTH_M);
+    let along = directions.map(|way| way.normalize()).max_by_key(|along| on(place, *along).count())?;
+    let share = on(place, along).count() as f64 / points.len() as f64;
+    if share >= WALL_SHARE { principal_axis(on(place, along)) } else { None }
+}
+
+/// The middle of points and the direction in which they spread, if there are enough, over enough of a length.
+fn principal_axis<'a>(
+    points: impl Iterator<Item = &'a Point2<f64>> + Clone,
+) -> Option<(Point2<f64>, Vector2<f64>)> {
     let count = points.clone().count();
     if count < WALL_ENDS {
         return None;
@@ -234,12 +299,7 @@ fn line(points: impl Iterator<Item = Point2<f64>> + Clone) -> Option<Vector2<f64
     }
     let direction_rad = 0.5 * (2.0 * xy).atan2(xx - yy);
     let along = Vector2::new(direction_rad.cos(), direction_rad.sin());
-    let across = Vector2::new(-along.y, along.x);
-    let (mut least_m, mut most_m, mut off_m) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for offset in points.map(|point| point - middle) {
-        let here_m = along.dot(&offset);
-        (least_m, most_m) = (least_m.min(here_m), most_m.max(here_m));
-        off_m = off_m.max(across.dot(&offset).abs());
-    }
-    (most_m - least_m >= WALL_LENGTH_M && off_m <= WALL_THICK_M).then_some(along)
+    let spread = points.map(|point| along.dot(&(point - middle)));
+    let (least_m, most_m) = spread.fold((0.0_f64, 0.0_f64), |(least, most), at| (least.min(at), most.max(at)));
+    (most_m - least_m >= WALL_LENGTH_M).then_some((middle, along))
 }
