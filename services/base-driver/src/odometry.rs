@@ -19,7 +19,7 @@ pub struct Snapshot {
     travelled: [f64; 2],
     encoders: [f64; 2],
     /// The ground that the hull has just covered.
-    trail: Vec<[f64; 3]>,
+    trail: Vec<[i64; 3]>,
 }
 
 /// The pose since the start, by exact arcs.
@@ -50,7 +50,7 @@ impl DeadReckoning {
     }
 
     /// What a successor needs to go on in the same frame; `None` before the first reading.
-    pub(crate) fn snapshot(&self, trail: Vec<[f64; 3]>) -> Option<Snapshot> {
+    pub(crate) fn snapshot(&self, trail: Vec<[i64; 3]>) -> Option<Snapshot> {
         let (_, encoders) = self.last?;
         let Pose2 { x_m, y_m, heading_rad } = self.pose;
         let pair = |travel: WheelTravel| [travel.left_m, travel.right_m];

@@ -9,9 +9,11 @@ const HELD_STEP_S: f64 = 0.025;
 const BRAKING_STEP_S: f64 = 0.05;
 /// However slowly the motors brake: the rest of the way is not looked at.
 const STEPS_MAX: usize = 60;
-/// What is nearer than it should be already may come nearer by this, for noise, until it is so much nearer.
+/// A robot that stands nearer to something than it should may drive on beside it, no nearer but for this, for noise, until it is so much
+/// nearer; and what is nearer still may not come nearer at all.
 const NOISE_M: f64 = 0.001;
 const NEARER_SHARE: f64 = 0.75;
+const NEAREST_SHARE: f64 = 0.5;
 
 /// Where the robot is, seen from where it is now, until it stands: the wheels turn as `now`, are told `told` until the motors' watchdog
 /// knows that nobody tells them anything any more, and brake.
@@ -45,14 +47,15 @@ fn towards(present: f64, wanted: f64, change: f64) -> f64 {
     present + (wanted - present).clamp(-change, change)
 }
 
-/// Whether the hull keeps `margin_m` from all these points, which are given in the robot's present frame; what is nearer already may not
-/// come nearer.
+/// Whether the hull keeps `margin_m` from all these points, which are given in the robot's present frame.
 pub(crate) fn keeps_off(hull: &Hull, poses: &[Pose2], points: &[Point2<f64>], margin_m: f64) -> bool {
+    let present = points.iter().map(|point| hull.distance_to_m(*point));
+    // Where something is inside the hull, the guard errs.
+    let nearest_m = present.filter(|distance_m| *distance_m > 0.0).fold(f64::INFINITY, f64::min);
+    let less_noise_m = |now_m: f64| if now_m > NEARER_SHARE * margin_m { now_m - NOISE_M } else { now_m };
+    let kept_m = less_noise_m(nearest_m).clamp(NEAREST_SHARE * margin_m, margin_m);
     points.iter().all(|point| {
-        let now_m = hull.distance_to_m(*point);
-        let noise_m = if now_m > NEARER_SHARE * margin_m { NOISE_M } else { 0.0 };
-        let least_m = margin_m.min(now_m - noise_m);
-        // No corner comes nearer than that from farther away.
-        poses.iter().all(|pose| hull.distance_m(*pose, *point) >= least_m)
+        let least_m = kept_m.min(less_noise_m(hull.distance_to_m(*point)));
+        poses.iter().all(|pose| hull.distance_m(*pose, *point) >= least_m - 1e-9)
     })
 }

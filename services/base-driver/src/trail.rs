@@ -3,11 +3,12 @@
 use geometry::{Hull, Point2, Pose2, angle};
 use std::collections::VecDeque;
 
-/// Poses of the trail lie so far apart, or differ by so much.
+/// Poses of the trail lie so far apart, or differ by so much: between two of them no corner of the hull swings out by more than what it may
+/// lie beside the ground that it has covered.
 const APART_M: f64 = 0.03;
-const APART_RAD: f64 = 0.07;
-/// So many are remembered at most: more than a metre of them, or most of a turn.
-const POSES_MAX: usize = 72;
+const APART_RAD: f64 = 0.02;
+/// So many are remembered at most: more than a metre of them, or a good quarter of a turn.
+const POSES_MAX: usize = 96;
 /// The hull may lie so far beside the ground that it has covered: less than what the odometry errs by on the way.
 const BESIDE_M: f64 = 0.01;
 /// Points along the hull's rear edge and rear sides that are looked at.
@@ -21,15 +22,19 @@ pub(crate) struct Trail {
 }
 
 impl Trail {
-    /// For a successor.
-    pub(crate) fn kept(&self) -> Vec<[f64; 3]> {
-        self.poses.iter().map(|pose| [pose.x_m, pose.y_m, pose.heading_rad]).collect()
+    /// For a successor: in tenths of a millimetre and of a thousandth of a radian, which is as fine as it has to be.
+    pub(crate) fn kept(&self) -> Vec<[i64; 3]> {
+        let fine = |pose: &Pose2| [pose.x_m, pose.y_m, pose.heading_rad].map(|number| (number * 1e4).round() as i64);
+        self.poses.iter().map(fine).collect()
     }
 
     /// From a predecessor.
-    pub(crate) fn restored(kept: &[[f64; 3]]) -> Self {
-        let poses = kept.iter().take(POSES_MAX).map(|&[x_m, y_m, heading_rad]| Pose2 { x_m, y_m, heading_rad });
-        Self { poses: poses.filter(|pose| pose.is_finite()).collect() }
+    pub(crate) fn restored(kept: &[[i64; 3]]) -> Self {
+        let pose = |kept: &[i64; 3]| {
+            let [x_m, y_m, heading_rad] = kept.map(|number| number as f64 * 1e-4);
+            Pose2::new(x_m, y_m, heading_rad)
+        };
+        Self { poses: kept.iter().take(POSES_MAX).map(pose).collect() }
     }
 
     /// The encoders have begun anew: nobody knows where the robot has been.
