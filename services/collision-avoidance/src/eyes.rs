@@ -10,6 +10,8 @@ use std::ops::Range;
 const FACES: [(Face, Range<usize>); 3] = [(Face::Right, 0..2), (Face::Front, 2..6), (Face::Left, 6..8)];
 /// What a neighbour sees so near, a sensor sees as well.
 const NEIGHBOUR_SEES_M: f32 = 0.5;
+/// Farther ahead a sensor at the usual height sees the floor, which stays where it is.
+const SURELY_A_THING_M: f32 = 0.9;
 /// A robot does not get so far from one frame to the next.
 const JUMP_M: f64 = 0.5;
 
@@ -50,8 +52,10 @@ impl Eyes {
             }
         }
         let same = self.last.replace(*ranges).is_some_and(|last| last == *ranges);
-        let tells = (0..TOF_COUNT).any(|sensor| matches!(ranges.reading(sensor), Reading::Distance(_)));
-        self.frozen_m = if same && tells { self.frozen_m + way_m } else { 0.0 };
+        // What is seen ahead comes nearer when the robot drives; walls beside it may well stay where they are.
+        let is_thing = |sensor: usize| matches!(ranges.reading(sensor), Reading::Distance(m) if m < SURELY_A_THING_M);
+        let sees_ahead = FACES[1].1.clone().any(is_thing);
+        self.frozen_m = if same && sees_ahead { self.frozen_m + way_m } else { 0.0 };
     }
 
     /// Whether a sensor can be believed when it sees nothing, and whether any can be believed at all.

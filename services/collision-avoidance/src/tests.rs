@@ -233,7 +233,7 @@ fn silence_is_a_stop() {
     bench.feed_times(3, &ranges);
     let last = Time::from_secs_f64(bench.now_s);
     let mut after = |ms: u64| {
-        let now = last.after(std::time::Duration::from_millis(ms));
+        let now = last.after(Duration::from_millis(ms));
         let inputs = Inputs { ranges: Some(Stamped::new(last, &ranges)), ..Inputs::default() };
         bench.guard.step(now, inputs).clearance
     };
@@ -539,7 +539,7 @@ proptest! {
         let mut guard = CollisionAvoidance::new(Params::default()).unwrap();
         let mut now = Time::from_secs_f64(1.0);
         for (ranges, odometry, gap_ms) in &frames {
-            now = now.after(std::time::Duration::from_millis(gap_ms + 1));
+            now = now.after(Duration::from_millis(gap_ms + 1));
             let odometry = odometry.as_ref().map(|odometry| Stamped::new(now, odometry));
             let said = guard.step(now, Inputs { ranges: Some(Stamped::new(now, ranges)), odometry, ..Inputs::default() }).clearance;
             let radius = |sensor| if (2..6).contains(&sensor) { 0.2 } else { 0.05 };
