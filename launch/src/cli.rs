@@ -1,9 +1,10 @@
 //! The command line.
 
 use crate::graph::{Overrides, Request};
-use board::arguments::positive;
+use board::arguments::{positive, seconds};
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use std::path::PathBuf;
+use std::time::Duration;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -406,11 +407,11 @@ pub(crate) struct SwapArgs {
     #[arg(long, conflicts_with = "back")]
     pub(crate) shadow: bool,
     /// With --shadow: end after so many seconds, instead of on Ctrl-C
-    #[arg(long = "for", value_name = "SECONDS", requires = "shadow", value_parser = positive)]
-    pub(crate) length_s: Option<f64>,
+    #[arg(long = "for", value_name = "SECONDS", requires = "shadow", value_parser = seconds)]
+    pub(crate) length: Option<Duration>,
     /// Let it run beside the old one for so many seconds at least
-    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["back", "shadow"], value_parser = positive)]
-    pub(crate) warm_up: Option<f64>,
+    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["back", "shadow"], value_parser = seconds)]
+    pub(crate) warm_up: Option<Duration>,
     /// Bring back what played this role before, or send its newcomer away
     #[arg(long, value_name = "ROLE", conflicts_with = "swap")]
     pub(crate) back: Option<String>,

@@ -165,7 +165,7 @@ fn compare_until_the_end(args: &SwapArgs, place: &Place, role: &str) -> Result<(
             *health = newest(reader).unwrap_or(*health);
         }
         let now = clock::monotonic();
-        let over = args.length_s.is_some_and(|length_s| now.seconds_since(began) >= length_s);
+        let over = args.length.is_some_and(|length| now.since(began) >= length);
         let down = !control::is_up(place)?;
         if over || down || signals.count() > 0 {
             break;

@@ -50,7 +50,7 @@ fn checked(args: &SwapArgs, status: &Status, role: &str, run: &str) -> Result<Sw
         .into_iter()
         .find(|service| service.role == role)
         .ok_or_else(|| format!("the graph's file has no `{role}` any more"))?;
-    let warm_up = Duration::from_secs_f64(args.warm_up.unwrap_or(0.0));
+    let warm_up = args.warm_up.unwrap_or_default();
     Ok(SwapRequest { service, topics: checked.topics, overrides, shadow: args.shadow, warm_up })
 }
 
@@ -67,7 +67,7 @@ fn back(args: &SwapArgs, place: &Place, role: &str) -> Result<(), String> {
 
 /// Waits until the newcomer has taken over and has said something, or has failed.
 fn await_swap(args: &SwapArgs, place: &Place, role: &str) -> Result<(), String> {
-    let warm_up = Duration::from_secs_f64(args.warm_up.unwrap_or(0.0));
+    let warm_up = args.warm_up.unwrap_or_default();
     let deadline = clock::monotonic().after(LIMIT + warm_up);
     loop {
         let state = state_of(place, role)?;

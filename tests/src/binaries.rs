@@ -23,7 +23,7 @@ pub fn build() -> &'static PathBuf {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let output = Command::new(cargo)
-            .args(["build", "--release", "--bins", "--workspace", "--exclude", "tests"])
+            .args(["build", "--release", "--bins", "--workspace"])
             .args(["--message-format", "short", "--color", "never"])
             .current_dir(root)
             // What cargo set for this test would make it build everything anew.

@@ -6,6 +6,7 @@ pub mod angle;
 mod body;
 mod cone;
 mod grid;
+mod hull;
 mod map_file;
 mod polygon;
 mod pose;
@@ -21,6 +22,7 @@ pub use grid::{
     Cell, CellsAlong, CellsBetween, Grid, GridError, GridFrame, MOST_CELLS, Occupancy, OccupancyGrid,
     log_odds, probability,
 };
+pub use hull::Hull;
 pub use map_file::{MapError, MapHeader, MapImage, MapMode, MapProblem};
 pub use nalgebra::{Point2, Vector2};
 pub use polygon::{Polygon, PolygonError, Shape, is_simple};

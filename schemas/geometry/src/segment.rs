@@ -53,6 +53,13 @@ impl Segment {
         self.a + self.vector() * fraction
     }
 
+    /// Points along it from one end to the other, evenly spread and no farther apart than `apart_m`.
+    pub fn points(&self, apart_m: f64) -> impl Iterator<Item = Point2<f64>> + Clone + use<> {
+        let pieces = (self.length_m() / apart_m).ceil().max(1.0) as u32;
+        let line = *self;
+        (0..=pieces).map(move |piece| line.a + line.vector() * (f64::from(piece) / f64::from(pieces)))
+    }
+
     /// How far along the piece the point closest to `point` lies: 0 at `a`, 1 at `b`.
     pub fn closest_fraction(&self, point: Point2<f64>) -> f64 {
         let along = self.vector();

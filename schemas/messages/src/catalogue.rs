@@ -23,6 +23,7 @@ pub fn catalogue() -> Vec<Description> {
         MissionStatus,
         MotionCommand,
         MotionReport,
+        NearPoint,
         OccupancyMap,
         Odometry,
         Order,

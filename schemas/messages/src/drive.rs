@@ -41,12 +41,17 @@ crate::state! {
         InvalidCommand = 5,
         /// A message of the guard that has no meaning.
         InvalidGuard = 6,
-        /// The motor controller does not answer.
+        /// The motor controller does not answer, or the encoders do not show what the wheels are told.
         DeviceFault = 7,
         /// The driver is leaving.
         ShuttingDown = 8,
         /// The guard stops for something in front only, and the command leads slowly backwards, away from it.
         Escaping = 9,
+        /// The command leads into something that the guard knows of, backwards over ground that was not driven, or beyond what was
+        /// ordered.
+        NoRoom = 10,
+        /// The guard's word names no radius in which the robot could stop.
+        NothingGuarded = 11,
     }
 }
 

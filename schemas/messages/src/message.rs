@@ -130,9 +130,10 @@ impl<'a, T: Message> Stamped<'a, T> {
         Self { stamp, origin: stamp, sequence: 0, message, elements }
     }
 
-    /// The message if it was published no longer than `max_age` ago.
+    /// The message if it was published no longer than `max_age` ago, and not farther ahead than that either: a stamp from the far future
+    /// would stay fresh for ever.
     pub fn fresh(self, now: Time, max_age: std::time::Duration) -> Option<Self> {
-        (now.since(self.stamp) <= max_age).then_some(self)
+        (now.since(self.stamp) <= max_age && self.stamp.since(now) <= max_age).then_some(self)
     }
 }
 

@@ -118,8 +118,9 @@ impl TofRanges {
 /// A scan of a laser or of a turning sensor: the header, then one range per beam. Published on `laser/scan`, by `ultrasonic-driver` on
 /// `sonar/raw`, and by `scan-conditioner` on `sonar/scan`.
 ///
-/// Beam `i` looks along `sensor_heading_rad + angle_min_rad + i * angle_step_rad` in the robot's frame. A range that is zero, not
-/// finite or not below `range_max_m` is no reading.
+/// Beam `i` looks along `sensor_heading_rad + angle_min_rad + i * angle_step_rad` in the robot's frame. Ranges from `range_max_m` on,
+/// and +inf, say that nothing was seen; -inf says that something is too near to be measured (ROS REP 117); zero, negative numbers and
+/// NaN are no readings.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[message(element = f32)]
 #[repr(C)]

@@ -12,6 +12,15 @@ pub struct WheelTravel {
     pub right_m: f64,
 }
 
+/// A reading of both encoders.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Encoders {
+    /// When it was taken.
+    pub taken: Time,
+    /// What they had counted then.
+    pub travel: WheelTravel,
+}
+
 impl WheelTravel {
     /// Whether both numbers are finite.
     pub fn is_finite(&self) -> bool {
@@ -42,9 +51,10 @@ pub trait BaseDevice: std::fmt::Debug {
     ///
     /// # Errors
     /// When the controller does not answer; the wheels are then told to stop.
-    fn travel(&mut self, now: Time) -> Result<WheelTravel, DeviceError>;
+    fn encoders(&mut self, now: Time) -> Result<Encoders, DeviceError>;
 
-    /// Tells the motors their speeds. A controller must stop its motors by itself when it hears nothing for 100 ms.
+    /// Tells the motors their speeds. A controller must stop its motors by itself when it hears nothing for
+    /// [`crate::Params::motor_watchdog_ms`].
     ///
     /// # Errors
     /// When the controller does not answer.
@@ -55,7 +65,7 @@ pub trait BaseDevice: std::fmt::Debug {
 #[derive(Debug, Clone)]
 pub struct SimulatedBase {
     deadline: Duration,
-    heard: Option<(Time, WheelTravel)>,
+    heard: Option<Encoders>,
 }
 
 impl SimulatedBase {
@@ -69,15 +79,15 @@ impl BaseDevice for SimulatedBase {
     fn see(&mut self, truth: Option<Stamped<'_, WorldTruth>>) {
         if let Some(truth) = truth {
             let travel = WheelTravel { left_m: truth.left_travel_m, right_m: truth.right_travel_m };
-            self.heard = Some((truth.stamp, travel));
+            self.heard = Some(Encoders { taken: truth.stamp, travel });
         }
     }
 
-    fn travel(&mut self, now: Time) -> Result<WheelTravel, DeviceError> {
-        let (stamp, travel) = self.heard.ok_or(DeviceError::NeverHeard)?;
-        let silent = now.since(stamp);
+    fn encoders(&mut self, now: Time) -> Result<Encoders, DeviceError> {
+        let heard = self.heard.ok_or(DeviceError::NeverHeard)?;
+        let silent = now.since(heard.taken);
         if silent <= self.deadline {
-            Ok(travel)
+            Ok(heard)
         } else {
             Err(DeviceError::Silent { silent_ms: u64::try_from(silent.as_millis()).unwrap_or(u64::MAX) })
         }

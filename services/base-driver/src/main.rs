@@ -1,7 +1,7 @@
 //! The process around `base_driver`.
-use base_driver::{BaseDevice, BaseDriver, Device, Inputs, Params, Snapshot};
+use base_driver::{BaseDevice, BaseDriver, Device, Inputs, Params, Room, Snapshot};
 use board::{Kept, Latest, Publisher};
-use messages::{AppliedWheels, Clearance, Odometry, Time, WheelSpeeds, WorldTruth};
+use messages::{AppliedWheels, Clearance, MotionCommand, Odometry, Time, WheelSpeeds, WorldTruth};
 use std::process::ExitCode;
 
 /// What has to come to rest, whichever way the process leaves.
@@ -9,15 +9,19 @@ struct Base {
     driver: BaseDriver,
     device: Box<dyn BaseDevice>,
     applied: Publisher<AppliedWheels>,
-    kept: Kept<Snapshot>,
+    kept: Kept<Option<Snapshot>>,
     has_stepped: bool,
 }
 
 impl Base {
     fn step(&mut self, now: Time, ports: &mut Ports) {
         self.device.see(ports.truth.as_mut().and_then(Latest::read));
-        let travel = self.device.travel(now).ok();
-        let inputs = Inputs { clearance: ports.clearance.read(), desired: ports.desired.read(), travel };
+        let inputs = Inputs {
+            clearance: ports.clearance.read(),
+            desired: ports.desired.read(),
+            order: ports.order.as_mut().and_then(Latest::read),
+            encoders: self.device.encoders(now).ok(),
+        };
         let outputs = self.driver.step(now, inputs);
         // A controller that does not answer shows in its encoders with the next step.
         let _ = self.device.drive(outputs.applied.left_mps, outputs.applied.right_mps);
@@ -25,9 +29,7 @@ impl Base {
         if let Some(odometry) = outputs.odometry {
             ports.odometry.publish(&odometry);
         }
-        if let Some(snapshot) = self.driver.snapshot() {
-            self.kept.save_now_and_then(now, || snapshot);
-        }
+        self.kept.save_now_and_then(now, || self.driver.snapshot());
         self.has_stepped = true;
     }
 }
@@ -44,6 +46,7 @@ impl Drop for Base {
 struct Ports {
     clearance: Latest<Clearance>,
     desired: Latest<WheelSpeeds>,
+    order: Option<Latest<MotionCommand>>,
     truth: Option<Latest<WorldTruth>>,
     odometry: Publisher<Odometry>,
 }
@@ -53,6 +56,10 @@ fn main() -> ExitCode {
         let mut ports = Ports {
             clearance: node.latest("safety/clearance")?,
             desired: node.latest("wheels/desired")?,
+            order: match params.room {
+                Room::Ordered => Some(node.reference("motion/command")?),
+                Room::Seen | Room::Unchecked => None,
+            },
             truth: match params.device {
                 Device::Simulated => Some(node.reference("world/truth")?),
             },
@@ -65,7 +72,7 @@ fn main() -> ExitCode {
         let device = params.open_device();
         let mut driver = BaseDriver::new(params)?;
         let kept = node.kept();
-        if let Some(snapshot) = kept.restore() {
+        if let Some(snapshot) = kept.restore().flatten() {
             driver.restore(&snapshot);
         }
         let mut base = Base { driver, device, applied, kept, has_stepped: false };

@@ -14,34 +14,38 @@
 //! The ranges published (`front_m` and so on) are what a controller slows down by: a remembered obstacle counts, and a face with a
 //! sensor that cannot be trusted reads 0.
 //!
-//! # Leaving a STOP: the rule for `base-driver`
-//! A robot that stands before a static obstacle must be able to leave. The signal stays STOP, as the paper wants; the base driver,
-//! if `allow_escape` is set, lets one kind of motion pass in spite of it, because it leads away from the violated face:
-//! - `reason` is `Violation` or `Remembered`, and `violated_faces` is exactly `Face::Front`; never with another reason, and never
-//!   with an invalid or stale clearance (while it is `Settling` no face is violated, and the robot waits);
-//! - the command is backwards with both wheels, none faster than `escape_speed_mps` (about 0.1 m/s), best of all straight back;
-//! - at most `escape_distance_m` (about 0.3 m) in one stop, as the wheels count it; only a GO begins a new count.
+//! # What "far" has to be confirmed by
+//! - A face is believed when most of what looks out of it can be read: for a laser most beams of the hull's width and margin, with no gap
+//!   in which something could hide within the radius; for time-of-flight sensors half of the face's.
+//! - "Too near to be measured" (-inf) is the nearest there is.
+//! - Sensors that tell nothing but scattered light, that see nothing where their neighbour sees something, or whose readings do not change
+//!   while the robot drives, are broken.
 //!
-//! There is no sensor at the rear, which is why speed and distance are small: the robot only returns to where it just came from.
-//! Turning on the spot is not let pass: the corners of a 0.61 x 0.51 m body swing out by 0.09 m ahead and 0.14 m aside. When a side
-//! is violated nothing is let pass: backing off in a straight line brings the other end of the body nearer to the wall when the nose
-//! points away from it.
+//! # What is told beside the signal
+//! The radii, so that `base-driver` holds the robot to a speed from which it stops within them, and the points that are known to be near the
+//! hull ([`near`]): it moves the hull only where it can stop before it touches one.
 
+mod eyes;
 mod laser;
 mod memory;
+mod near;
 mod params;
 #[cfg(test)]
 mod tests;
 
 pub use params::{Params, ParamsError, Sensor};
 
-pub use memory::Snapshot;
-
+use eyes::Eyes;
+use geometry::Pose2;
+use laser::Scan;
 use memory::{Memory, Motion};
 use messages::{
-    Clearance, Face, GuardReasonName, Odometry, Parameters, RangeScan, Reading, Stamped, TOF_COUNT, Time,
-    TofRanges, Verdict,
+    Clearance, Face, GuardReasonName, KeptSighting, NearPoint, Odometry, Parameters, PoseEstimate, RangeScan,
+    Reading, Stamped, TOF_COUNT, Time, TofRanges, Verdict,
 };
+use near::Near;
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
 
 /// What the guard reads.
 #[derive(Debug, Clone, Copy, Default)]
@@ -50,16 +54,33 @@ pub struct Inputs<'a> {
     pub ranges: Option<Stamped<'a, TofRanges>>,
     /// `laser/scan`.
     pub scan: Option<Stamped<'a, RangeScan>>,
-    /// `wheels/odometry`, for the memory only.
+    /// `wheels/odometry`: what was seen is remembered in its frame.
     pub odometry: Option<Stamped<'a, Odometry>>,
+    /// `location/pose`: the walls of the map are near too.
+    pub pose: Option<Stamped<'a, PoseEstimate>>,
 }
 
 /// What the guard says.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outputs {
-    /// For `safety/clearance`, in every step.
+pub struct Outputs<'a> {
+    /// For `safety/clearance`, in every step: the header,
     pub clearance: Clearance,
+    /// and what is near, in the frame of the robot where the header says that it was.
+    pub near: &'a [NearPoint],
 }
+
+/// What a successor needs to remember.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Snapshot {
+    memory: memory::Snapshot,
+    near: Vec<KeptSighting>,
+}
+
+/// A pose that is older is none.
+const POSE_MAX_AGE: Duration = Duration::from_millis(500);
+
+/// Who does not know where the robot is.
+const NOWHERE: Pose2 = Pose2 { x_m: f64::NAN, y_m: f64::NAN, heading_rad: f64::NAN };
 
 /// The nearest reading of each face in metres; infinite when nothing is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,7 +120,9 @@ struct Channel {
 pub struct CollisionAvoidance {
     params: Params,
     channels: Vec<Channel>,
+    eyes: Eyes,
     memory: Memory,
+    near: Near,
     /// Stamp and sequence of the last frame, and when it was taken.
     frame: Option<(Time, u64, Time)>,
     /// Whether GO was ever said.
@@ -112,7 +135,7 @@ impl CollisionAvoidance {
     /// A guard that says STOP.
     ///
     /// # Errors
-    /// When the parameters make no sense.
+    /// When the parameters make no sense, or the world file cannot be used.
     pub fn new(params: Params) -> Result<Self, ParamsError> {
         params.check()?;
         use Face::{Front, Left, Right};
@@ -123,7 +146,9 @@ impl CollisionAvoidance {
         let channel = |&face| Channel { face, last: None, known: false, faulty: false, clear: 0 };
         Ok(Self {
             channels: faces.iter().map(channel).collect(),
+            near: Near::new(&params)?,
             params,
+            eyes: Eyes::default(),
             memory: Memory::default(),
             frame: None,
             confirmed: false,
@@ -134,16 +159,17 @@ impl CollisionAvoidance {
 
     /// What a successor needs to remember; it begins with STOP all the same.
     pub fn snapshot(&self) -> Snapshot {
-        self.memory.snapshot()
+        Snapshot { memory: self.memory.snapshot(), near: self.near.kept() }
     }
 
     /// Takes over what a predecessor remembered, before the first step.
     pub fn restore(&mut self, snapshot: &Snapshot) {
-        self.memory.restore(snapshot);
+        self.memory.restore(&snapshot.memory);
+        self.near.restore(&snapshot.near);
     }
 
     /// Judges the newest frame; a frame seen before counts once. Call it for every frame and once a heartbeat.
-    pub fn step(&mut self, now: Time, inputs: Inputs<'_>) -> Outputs {
+    pub fn step(&mut self, now: Time, inputs: Inputs<'_>) -> Outputs<'_> {
         let motion = self.motion(now, inputs.odometry);
         match self.params.sensor {
             Sensor::Tof => {
@@ -153,7 +179,7 @@ impl CollisionAvoidance {
             }
             Sensor::Laser => {
                 if let Some(scan) = inputs.scan.filter(|scan| self.is_new(now, scan)) {
-                    self.take_scan(scan);
+                    self.take_scan(now, scan, motion);
                 }
             }
         }
@@ -165,6 +191,10 @@ impl CollisionAvoidance {
         self.changes += u64::from(verdict != self.verdict);
         self.verdict = verdict;
         self.confirmed |= verdict == Verdict::Go;
+        let pose = inputs.pose.and_then(|pose| pose.fresh(now, POSE_MAX_AGE));
+        self.near.show_walls(pose.map(|pose| pose.message), motion, &self.params.hull());
+        let (at, near) = self.near.tell(motion, &self.params.hull());
+        let at = at.unwrap_or(NOWHERE);
         Outputs {
             clearance: Clearance {
                 signal: verdict.into(),
@@ -173,8 +203,16 @@ impl CollisionAvoidance {
                 front_m: nearest.front_m as f32,
                 right_m: nearest.right_m as f32,
                 left_m: nearest.left_m as f32,
+                front_radius_m: self.params.front_radius_m as f32,
+                right_radius_m: self.params.right_radius_m as f32,
+                left_radius_m: self.params.left_radius_m as f32,
+                max_age_ms: u32::try_from(self.params.max_age_ms).unwrap_or(u32::MAX),
                 changes: self.changes,
+                at_x_m: at.x_m,
+                at_y_m: at.y_m,
+                at_heading_rad: at.heading_rad,
             },
+            near,
         }
     }
 
@@ -195,9 +233,11 @@ impl CollisionAvoidance {
     fn take_tof(&mut self, now: Time, ranges: Stamped<'_, TofRanges>, motion: Option<Motion>) {
         let taken = ranges.stamp.min(ranges.origin);
         self.frame = Some((ranges.stamp, ranges.sequence, taken));
+        self.eyes.take(now, ranges.message, motion);
         let mut readings_m = [None; TOF_COUNT];
         for (sensor, reading_m) in readings_m.iter_mut().enumerate() {
             match ranges.reading(sensor) {
+                _ if !self.eyes.trusts(now, sensor, &self.params) => {}
                 Reading::Distance(range_m) => *reading_m = Some(f64::from(range_m)),
                 Reading::NoTarget => *reading_m = Some(f64::INFINITY),
                 Reading::Ignore => continue,
@@ -206,21 +246,25 @@ impl CollisionAvoidance {
             self.take_reading(sensor, taken, *reading_m);
         }
         self.memory.take(now, &readings_m, motion, &self.params);
+        self.near.take_tof(now, ranges.message, motion, &self.params.hull());
     }
 
-    fn take_scan(&mut self, scan: Stamped<'_, RangeScan>) {
-        let taken = scan.stamp.min(scan.origin);
-        self.frame = Some((scan.stamp, scan.sequence, taken));
-        let mut faces = laser::faces(&scan, &self.params);
-        for index in 0..self.channels.len() {
-            let face = self.channels[index].face;
-            self.take_reading(index, taken, faces.as_mut().map(|faces| *faces.of_mut(face)));
+    fn take_scan(&mut self, now: Time, message: Stamped<'_, RangeScan>, motion: Option<Motion>) {
+        let taken = message.stamp.min(message.origin);
+        self.frame = Some((message.stamp, message.sequence, taken));
+        let scan = Scan::of(&message);
+        let faces = scan.as_ref().map_or([None; 3], |scan| scan.faces(&self.params));
+        for (channel, reading_m) in faces.into_iter().enumerate() {
+            self.take_reading(channel, taken, reading_m);
+        }
+        if let Some(scan) = scan {
+            self.near.take_scan(now, &scan, motion, &self.params.hull());
         }
     }
 
     /// A reading of a channel, or `None` for a fault.
     fn take_reading(&mut self, index: usize, taken: Time, reading_m: Option<f64>) {
-        let radius_m = self.radius_m(self.channels[index].face);
+        let radius_m = self.params.radius_m(self.channels[index].face);
         let channel = &mut self.channels[index];
         channel.faulty = reading_m.is_none();
         channel.known |= reading_m.is_some();
@@ -246,7 +290,7 @@ impl CollisionAvoidance {
         let mut violated = 0;
         for channel in &self.channels {
             let reading_m = channel.last.map_or(0.0, |(_, reading_m)| reading_m);
-            if channel.last.is_some() && is_within(reading_m, self.radius_m(channel.face)) {
+            if channel.last.is_some() && is_within(reading_m, self.params.radius_m(channel.face)) {
                 violated |= channel.face as u32;
             }
             let face_m = nearest.of_mut(channel.face);
@@ -281,14 +325,6 @@ impl CollisionAvoidance {
             return if self.confirmed { GuardReasonName::Settling } else { GuardReasonName::Start };
         }
         GuardReasonName::Clear
-    }
-
-    fn radius_m(&self, face: Face) -> f64 {
-        match face {
-            Face::Front => self.params.front_radius_m,
-            Face::Right => self.params.right_radius_m,
-            Face::Left => self.params.left_radius_m,
-        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The process around `collision_avoidance`.
 use collision_avoidance::{CollisionAvoidance, Inputs, Params, Sensor, Snapshot};
-use messages::{Clearance, Odometry, RangeScan, TofRanges};
+use messages::{Clearance, Odometry, PoseEstimate, RangeScan, TofRanges};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -11,6 +11,7 @@ fn main() -> ExitCode {
             Sensor::Laser => (None, Some(node.latest::<RangeScan>("laser/scan")?)),
         };
         let mut odometry = node.optional_reference::<Odometry>("wheels/odometry")?;
+        let mut pose = node.optional_reference::<PoseEstimate>("location/pose")?;
         let mut clearance = node.publisher::<Clearance>("safety/clearance")?;
         if let Some(ranges) = &ranges {
             node.wake_on(ranges);
@@ -29,8 +30,10 @@ fn main() -> ExitCode {
                 ranges: ranges.as_mut().and_then(|ranges| ranges.read()),
                 scan: scan.as_mut().and_then(|scan| scan.read()),
                 odometry: odometry.read(),
+                pose: pose.read(),
             };
-            clearance.publish(&guard.step(now, inputs).clearance);
+            let outputs = guard.step(now, inputs);
+            clearance.publish_with(&outputs.clearance, outputs.near);
             kept.save_now_and_then(now, || guard.snapshot());
         })
     })

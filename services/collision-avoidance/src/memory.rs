@@ -39,7 +39,7 @@ impl Sight {
 
 /// What was near, and what of it vanished, when a predecessor last said so: per front sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Snapshot {
+pub(crate) struct Snapshot {
     seen: [Option<KeptSight>; FRONT_COUNT],
     vanished: [Option<KeptSight>; FRONT_COUNT],
 }
@@ -129,7 +129,7 @@ impl Memory {
         } else if self.vanished[slot].is_some_and(|sight| was_backed_off(&sight, mount, motion, params)) {
             self.vanished[slot] = None;
         } else if let Some(here) = self.vanished[slot].and_then(|sight| sight.now(motion))
-            && here.coords.norm() > params.body_front_m + params.memory_range_m() + 1.0
+            && here.coords.norm() > params.hull_front_m + params.memory_range_m() + 1.0
         {
             self.vanished[slot] = None;
         }
@@ -141,9 +141,8 @@ impl Memory {
             None => Some(0.0),
             Some(here) => {
                 // 20 mm for the errors of reading and odometry.
-                let in_the_way =
-                    here.y.abs() <= params.body_half_width_m + 0.02 && here.x > -params.body_rear_m;
-                in_the_way.then_some((here.x - params.body_front_m).max(0.0))
+                let in_the_way = here.y.abs() <= params.hull_side_m + 0.02 && here.x > -params.hull_rear_m;
+                in_the_way.then_some((here.x - params.hull_front_m).max(0.0))
             }
         };
         self.vanished.iter().flatten().filter_map(ahead).min_by(f64::total_cmp)

@@ -1,6 +1,7 @@
 //! What can be adjusted.
 
-use messages::{Parameters, TofRanges};
+use geometry::{Hull, WorldError};
+use messages::{Face, Parameters, TofRanges};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -19,6 +20,8 @@ pub enum Sensor {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
+    /// World file whose walls count as near while the pose is known; empty for none. The signal does not depend on it.
+    pub world: String,
     /// Which sensor is watched: "tof" or "laser".
     pub sensor: Sensor,
     /// A reading in front below this is a STOP (COF-064).
@@ -30,9 +33,18 @@ pub struct Params {
     /// A reading on the left below this is a STOP (COF-064).
     #[schemars(range(min = 0.0, max = 4.0))]
     pub left_radius_m: f64,
-    /// Readings older than this are none: STOP (COF-069).
+    /// Readings older than this are none: STOP (COF-069). Three frames of the sensor: one may be late and one be lost. The longer it is,
+    /// the slower `base-driver` lets the robot drive.
     #[schemars(range(min = 10, max = 5000))]
     pub max_age_ms: u64,
+    /// Sensors that tell nothing but "too little light" or "too much scatter" for longer than this see nothing at all: STOP for their
+    /// face, unless half of its sensors are better off.
+    #[schemars(range(min = 50, max = 60000))]
+    pub scatter_max_ms: u64,
+    /// A sensor that sees nothing while the robot drives so far past what its neighbour sees is blind; and readings that do not change in
+    /// the least on such a way are old ones: STOP. 0 does not look.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub blind_way_m: f64,
     /// The clearance is published at least this often, so that silence is noticed quickly.
     #[schemars(range(min = 5, max = 1000))]
     pub heartbeat_ms: u64,
@@ -56,13 +68,13 @@ pub struct Params {
     pub standstill_mps: f64,
     /// From the robot's centre to its front edge (COF-003).
     #[schemars(range(min = 0.01, max = 5.0))]
-    pub body_front_m: f64,
+    pub hull_front_m: f64,
     /// From the robot's centre to its rear edge (COF-003).
     #[schemars(range(min = 0.01, max = 5.0))]
-    pub body_rear_m: f64,
+    pub hull_rear_m: f64,
     /// Half of the robot's width (COF-003).
     #[schemars(range(min = 0.01, max = 5.0))]
-    pub body_half_width_m: f64,
+    pub hull_side_m: f64,
     /// A laser's face reaches beyond the body's edges by this; what lies diagonally beyond belongs to no face.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub laser_margin_m: f64,
@@ -71,21 +83,24 @@ pub struct Params {
 impl Default for Params {
     fn default() -> Self {
         Self {
+            world: String::new(),
             sensor: Sensor::Tof,
             front_radius_m: 0.200,
             right_radius_m: 0.050,
             left_radius_m: 0.050,
             max_age_ms: 300,
-            heartbeat_ms: 50,
+            scatter_max_ms: 500,
+            blind_way_m: 2.0,
+            heartbeat_ms: 25,
             clear_frames: 3,
             strict_paper: false,
             memory_m: 0.400,
             memory_jump_m: 0.250,
             memory_release_s: 3.0,
             standstill_mps: 0.02,
-            body_front_m: 0.305,
-            body_rear_m: 0.305,
-            body_half_width_m: 0.255,
+            hull_front_m: 0.305,
+            hull_rear_m: 0.305,
+            hull_side_m: 0.255,
             laser_margin_m: 0.05,
         }
     }
@@ -101,6 +116,23 @@ impl Params {
         Duration::from_millis(self.max_age_ms)
     }
 
+    pub(crate) fn scatter_max(&self) -> Duration {
+        Duration::from_millis(self.scatter_max_ms)
+    }
+
+    /// The robot from above.
+    pub(crate) fn hull(&self) -> Hull {
+        Hull { front_m: self.hull_front_m, rear_m: self.hull_rear_m, side_m: self.hull_side_m }
+    }
+
+    pub(crate) fn radius_m(&self, face: Face) -> f64 {
+        match face {
+            Face::Front => self.front_radius_m,
+            Face::Right => self.right_radius_m,
+            Face::Left => self.left_radius_m,
+        }
+    }
+
     pub(crate) fn frames_to_clear(&self) -> u32 {
         if self.strict_paper { 1 } else { self.clear_frames }
     }
@@ -111,8 +143,11 @@ impl Params {
 }
 
 /// Parameters that make no sense.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
+    /// The world file cannot be used.
+    #[error("world: {0}")]
+    World(#[from] WorldError),
     /// A number outside of its range.
     #[error("{name} = {value} lies outside of {min} to {max}; choose a value within")]
     OutOfRange {
@@ -170,15 +205,17 @@ impl Parameters for Params {
             ("right_radius_m", self.right_radius_m, 0.0, 4.0),
             ("left_radius_m", self.left_radius_m, 0.0, 4.0),
             ("max_age_ms", self.max_age_ms as f64, 10.0, 5000.0),
+            ("scatter_max_ms", self.scatter_max_ms as f64, 50.0, 60_000.0),
+            ("blind_way_m", self.blind_way_m, 0.0, 100.0),
             ("heartbeat_ms", self.heartbeat_ms as f64, 5.0, 1000.0),
             ("clear_frames", f64::from(self.clear_frames), 1.0, 100.0),
             ("memory_m", self.memory_m, 0.0, 4.0),
             ("memory_jump_m", self.memory_jump_m, 0.02, 2.0),
             ("memory_release_s", self.memory_release_s, 0.0, 60.0),
             ("standstill_mps", self.standstill_mps, 0.0, 0.2),
-            ("body_front_m", self.body_front_m, 0.01, 5.0),
-            ("body_rear_m", self.body_rear_m, 0.01, 5.0),
-            ("body_half_width_m", self.body_half_width_m, 0.01, 5.0),
+            ("hull_front_m", self.hull_front_m, 0.01, 5.0),
+            ("hull_rear_m", self.hull_rear_m, 0.01, 5.0),
+            ("hull_side_m", self.hull_side_m, 0.01, 5.0),
             ("laser_margin_m", self.laser_margin_m, 0.0, 1.0),
         ];
         for (name, value, min, max) in ranges {

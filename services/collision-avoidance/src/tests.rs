@@ -3,6 +3,10 @@ use geometry::{Cone, Pose2, Scene, Segment, Surface};
 use messages::{GuardReasonName as Why, GuardSignal, RangeStatus};
 use proptest::prelude::*;
 
+mod laser;
+mod near;
+mod sight;
+
 /// "Nothing in range".
 const FAR: f32 = f32::INFINITY;
 const NO_TARGET: RangeStatus = RangeStatus(4);
@@ -43,7 +47,7 @@ impl Bench {
         let odometry = self.odometry.as_ref().map(|odometry| Stamped::new(now, odometry));
         self.said = self
             .guard
-            .step(now, Inputs { ranges: Some(Stamped::new(now, ranges)), scan: None, odometry })
+            .step(now, Inputs { ranges: Some(Stamped::new(now, ranges)), odometry, ..Inputs::default() })
             .clearance;
         self.said
     }
@@ -229,7 +233,7 @@ fn silence_is_a_stop() {
     bench.feed_times(3, &ranges);
     let last = Time::from_secs_f64(bench.now_s);
     let mut after = |ms: u64| {
-        let now = last.after(std::time::Duration::from_millis(ms));
+        let now = last.after(Duration::from_millis(ms));
         let inputs = Inputs { ranges: Some(Stamped::new(last, &ranges)), ..Inputs::default() };
         bench.guard.step(now, inputs).clearance
     };
@@ -478,74 +482,6 @@ fn furniture_in_the_way_halts_the_robot_for_good() {
     check_approach(geometry::BodyKind::CardboardBox, -0.3);
 }
 
-// ---- Laser.
-
-fn laser(params: impl FnOnce(&mut Params)) -> Params {
-    let mut all = Params { sensor: Sensor::Laser, ..Params::default() };
-    params(&mut all);
-    all
-}
-
-/// 181 beams from the robot's front edge, each `range_m` of its direction in degrees.
-fn scan_of(range_m: impl Fn(i32) -> f32) -> (RangeScan, Vec<f32>) {
-    let header = RangeScan {
-        sensor_x_m: 0.25,
-        angle_min_rad: (-90.0_f64).to_radians(),
-        angle_step_rad: 1.0_f64.to_radians(),
-        range_max_m: 30.0,
-        ..RangeScan::default()
-    };
-    (header, (-90..=90).map(range_m).collect())
-}
-
-fn scan_said(params: Params, scan: &(RangeScan, Vec<f32>)) -> Clearance {
-    let mut guard = CollisionAvoidance::new(params).unwrap();
-    let mut said = Clearance::default();
-    for step in 1..=5 {
-        let now = Time::from_secs_f64(f64::from(step) * 0.1);
-        let inputs =
-            Inputs { scan: Some(Stamped::with_elements(now, &scan.0, &scan.1)), ..Inputs::default() };
-        said = guard.step(now, inputs).clearance;
-    }
-    said
-}
-
-#[track_caller]
-fn check_scan(range_m: impl Fn(i32) -> f32, reason: Why, faces: u32) {
-    let said = scan_said(laser(|_| ()), &scan_of(range_m));
-    assert_eq!((said.reason, said.violated_faces), (reason.into(), faces), "{said:?}");
-    assert_eq!(said.signal == Verdict::Go, reason == Why::Clear);
-}
-
-#[test]
-fn a_laser_guards_the_three_faces() {
-    check_scan(|_| 5.0, Why::Clear, 0);
-    check_scan(|_| 81.0, Why::Clear, 0);
-    check_scan(|_| f32::INFINITY, Why::Clear, 0);
-    // The hull's front edge is 55 mm ahead of the sensor.
-    check_scan(|degrees| if degrees == 0 { 0.26 } else { 5.0 }, Why::Clear, 0);
-    check_scan(|degrees| if degrees == 0 { 0.25 } else { 5.0 }, Why::Violation, Face::Front as u32);
-    check_scan(|degrees| if degrees == -90 { 0.31 } else { 5.0 }, Why::Clear, 0);
-    check_scan(|degrees| if degrees == -90 { 0.30 } else { 5.0 }, Why::Violation, Face::Right as u32);
-    check_scan(|degrees| if degrees == 90 { 0.30 } else { 5.0 }, Why::Violation, Face::Left as u32);
-    // Ahead, but beside the body's width and margin.
-    check_scan(|degrees| if degrees == 75 { 0.35 } else { 5.0 }, Why::Clear, 0);
-    // Within the hull.
-    check_scan(|degrees| if degrees == 0 { 0.01 } else { 5.0 }, Why::Violation, Face::Front as u32);
-    check_scan(|_| f32::NAN, Why::SensorFault, 0);
-    check_scan(|_| 0.0, Why::SensorFault, 0);
-    check_scan(|degrees| if degrees % 3 == 0 { 0.0 } else { 5.0 }, Why::Clear, 0);
-    let mut broken = scan_of(|_| 5.0);
-    broken.0.angle_step_rad = f64::NAN;
-    assert_eq!(scan_said(laser(|_| ()), &broken).reason, Why::SensorFault);
-    let mut backwards = scan_of(|_| 5.0);
-    backwards.0.sensor_heading_rad = std::f64::consts::PI;
-    assert_eq!(scan_said(laser(|_| ()), &backwards).reason, Why::SensorFault);
-    assert_eq!(scan_said(laser(|_| ()), &(RangeScan::default(), Vec::new())).reason, Why::SensorFault);
-    let (header, ranges) = scan_of(|_| 5.0);
-    assert_eq!(scan_said(Params::default(), &(header, ranges)).reason, Why::Start);
-}
-
 // ---- Parameters.
 
 #[track_caller]
@@ -603,9 +539,9 @@ proptest! {
         let mut guard = CollisionAvoidance::new(Params::default()).unwrap();
         let mut now = Time::from_secs_f64(1.0);
         for (ranges, odometry, gap_ms) in &frames {
-            now = now.after(std::time::Duration::from_millis(gap_ms + 1));
+            now = now.after(Duration::from_millis(gap_ms + 1));
             let odometry = odometry.as_ref().map(|odometry| Stamped::new(now, odometry));
-            let said = guard.step(now, Inputs { ranges: Some(Stamped::new(now, ranges)), scan: None, odometry }).clearance;
+            let said = guard.step(now, Inputs { ranges: Some(Stamped::new(now, ranges)), odometry, ..Inputs::default() }).clearance;
             let radius = |sensor| if (2..6).contains(&sensor) { 0.2 } else { 0.05 };
             let bad = (0..8).any(|sensor| match ranges.reading(sensor) {
                 Reading::Distance(m) => m < radius(sensor),
@@ -617,14 +553,6 @@ proptest! {
             prop_assert!(said.signal == Verdict::Stop || said.violated_faces == 0);
             prop_assert!(said.front_m >= 0.0 && said.right_m >= 0.0 && said.left_m >= 0.0);
         }
-    }
-
-    #[test]
-    fn any_scan_is_survived(header in prop::array::uniform6(any::<f64>()), ranges in prop::collection::vec(any::<f32>(), 0..50)) {
-        let [sensor_x_m, sensor_y_m, sensor_heading_rad, angle_min_rad, angle_step_rad, range_max_m] = header;
-        let header = RangeScan { sensor_x_m, sensor_y_m, sensor_heading_rad, angle_min_rad, angle_step_rad, range_max_m };
-        let said = scan_said(laser(|_| ()), &(header, ranges));
-        prop_assert!(said.front_m >= 0.0 && said.right_m >= 0.0 && said.left_m >= 0.0);
     }
 }
 

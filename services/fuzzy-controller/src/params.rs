@@ -173,6 +173,11 @@ impl Default for Params {
 }
 
 impl Params {
+    /// The hull as the turning centre sees it.
+    pub(crate) fn hull(&self) -> geometry::Hull {
+        geometry::Hull { front_m: self.hull_front_m, rear_m: self.hull_rear_m, side_m: self.hull_side_m }
+    }
+
     /// Time between two steps.
     pub fn period(&self) -> Duration {
         Duration::from_millis(self.period_ms)

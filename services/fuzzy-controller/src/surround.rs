@@ -7,28 +7,9 @@
 use crate::controllers::Wheels;
 use crate::params::Params;
 use geometry::{Point2, Pose2, Segment, Vector2, angle};
-use messages::{Reading, TOF_COUNT, Time, TofRanges};
+use messages::{KeptSighting, SEEN_WITHIN_M, Sightings, TOF_SLOPE, Time, TofRanges};
 use serde::{Deserialize, Serialize};
 
-/// Readings up to here are remembered.
-const SEEN_WITHIN_M: f64 = 0.8;
-/// Half of a sensor's field of view (COF-021), and the share of it in which a reading that passes is trusted to see everything.
-const HALF_CONE: f64 = 0.13;
-const SURE_SHARE: f64 = 0.6;
-/// The points at a reading's ends, which lie on the edge of that share, are within it.
-const SLACK_M: f64 = 0.01;
-/// A point this much nearer than a reading would have been seen.
-const PASSED_M: f64 = 0.08;
-/// Points nearer to each other than this are one.
-const ONE_POINT_M: f64 = 0.03;
-/// Sightings count up to here, in readings that pass: thin things are not always seen (COF-123).
-const SIGHTING: u8 = 3;
-const WEIGHT_MAX: u8 = 12;
-/// What was not seen for so long, or lies so far away, is forgotten.
-const KEPT_S: f64 = 20.0;
-const KEPT_WITHIN_M: f64 = 1.5;
-/// So many points are remembered at most.
-const POINTS_MAX: usize = 800;
 /// Known walls are looked at in points so far apart, and within this distance.
 const WALL_POINT_M: f64 = 0.04;
 const WALLS_WITHIN_M: f64 = 1.1;
@@ -55,17 +36,10 @@ const JUMP_M: f64 = 0.5;
 /// Slow enough for the narrowest places.
 const SLOW_MPS: f64 = 0.10;
 
-#[derive(Debug, Clone, Copy)]
-struct Point {
-    place: Point2<f64>,
-    seen: Time,
-    weight: u8,
-}
-
 /// The points seen, in the frame of odometry.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Surround {
-    points: Vec<Point>,
+    points: Sightings,
     here: Option<Pose2>,
     /// The last place that was known.
     last_here: Option<Pose2>,
@@ -75,7 +49,7 @@ pub(crate) struct Surround {
     /// The direction of the nearest long wall.
     axis: Option<Vector2<f64>>,
     /// How far what was seen may reach beyond its seen end.
-    assumed: Vec<Point>,
+    assumed: Sightings,
     /// When this was last judged, and where the robot was.
     judged: Option<(Time, Option<Pose2>)>,
     stuck_since: Option<Time>,
@@ -85,31 +59,20 @@ pub(crate) struct Surround {
 /// What was seen around the robot when a predecessor last said so: places in the frame of odometry in millimetres, how sure, and when.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
-    points: Vec<(i32, i32, u8, u64)>,
-    assumed: Vec<(i32, i32, u8, u64)>,
+    points: Vec<KeptSighting>,
+    assumed: Vec<KeptSighting>,
 }
 
 impl Surround {
     /// What a successor needs: it must not turn into what lies in the gaps between the sensors.
     pub(crate) fn snapshot(&self) -> Snapshot {
-        let mm = |metres: f64| (metres * 1e3).round() as i32;
-        let kept =
-            |point: &Point| (mm(point.place.x), mm(point.place.y), point.weight, point.seen.as_nanos());
-        Snapshot {
-            points: self.points.iter().map(kept).collect(),
-            assumed: self.assumed.iter().map(kept).collect(),
-        }
+        Snapshot { points: self.points.kept(), assumed: self.assumed.kept() }
     }
 
     /// Takes over what a predecessor saw.
     pub(crate) fn restore(&mut self, snapshot: &Snapshot) {
-        let point = |&(x_mm, y_mm, weight, seen): &(i32, i32, u8, u64)| Point {
-            place: Point2::new(f64::from(x_mm) / 1e3, f64::from(y_mm) / 1e3),
-            weight,
-            seen: Time::from_nanos(seen),
-        };
-        self.points = snapshot.points.iter().take(POINTS_MAX).map(point).collect();
-        self.assumed = snapshot.assumed.iter().take(POINTS_MAX).map(point).collect();
+        self.points = Sightings::restored(&snapshot.points);
+        self.assumed = Sightings::restored(&snapshot.assumed);
     }
 
     /// Takes in the newest readings, with the robot at `here` in the frame of odometry; without a place nothing is known.
@@ -127,46 +90,21 @@ impl Surround {
             self.points.clear();
             self.assumed.clear();
         }
-        let is_kept = |point: &Point| {
-            let near = (point.place - here.position()).norm() <= KEPT_WITHIN_M;
-            let below = distance_m(here, point.place, params) <= 0.0;
-            near && !below && now.seconds_since(point.seen) <= KEPT_S
-        };
-        self.points.retain(is_kept);
+        self.points.forget(now, here, &params.hull(), 0.0);
         self.doubted_since = self.doubted_since.filter(|since| now.seconds_since(*since) < DOUBT_S);
-        self.assumed.retain(|point| is_kept(point) && distance_m(here, point.place, params) > NONE_HERE_M);
+        self.assumed.forget(now, here, &params.hull(), NONE_HERE_M);
         let Some((stamp, ranges)) = ranges.filter(|(stamp, _)| self.frame != Some(*stamp)) else { return };
         self.frame = Some(stamp);
-        let looks = (0..TOF_COUNT).filter_map(|sensor| {
-            let range_m = match ranges.reading(sensor) {
-                Reading::Distance(range_m) => f64::from(range_m),
-                Reading::NoTarget => f64::INFINITY,
-                Reading::Ignore | Reading::Fault => return None,
-            };
-            Some((here.compose(TofRanges::MOUNTS[sensor]), range_m))
-        });
+        let looks = ranges.looks(here);
         for (eye, range_m) in looks.clone() {
-            let passed_m = range_m.min(SEEN_WITHIN_M) - PASSED_M;
-            let remains = |point: &mut Point| {
-                let seen = eye.inverse_transform(point.place);
-                if seen.x > 0.0
-                    && seen.x < passed_m
-                    && seen.y.abs() <= SURE_SHARE * HALF_CONE * seen.x + SLACK_M
-                {
-                    point.weight = point.weight.saturating_sub(1);
-                }
-                point.weight > 0
-            };
-            self.points.retain_mut(remains);
+            self.points.see_through(eye, range_m, TOF_SLOPE);
             // The side sensors look over a shelf; those in front saw it from farther away.
             if (eye.heading_rad - here.heading_rad).abs() < 0.1 {
-                self.assumed.retain_mut(remains);
+                self.assumed.see_through(eye, range_m, TOF_SLOPE);
             }
         }
         for (eye, range_m) in looks.filter(|(_, range_m)| *range_m < SEEN_WITHIN_M) {
-            for share in [-SURE_SHARE, 0.0, SURE_SHARE] {
-                add(&mut self.points, now, eye.transform(Point2::new(range_m, share * HALF_CONE * range_m)));
-            }
+            self.points.add_reading(now, eye, range_m);
             self.assume(now, here, eye.transform(Point2::new(range_m, 0.0)), range_m);
         }
     }
@@ -177,10 +115,8 @@ impl Surround {
         self.axis = None;
         let (Some(pose), Some(here)) = (pose, self.here) else { return };
         for wall in walls.iter().filter(|wall| wall.distance_m(pose.position()) < WALLS_WITHIN_M) {
-            let pieces = (wall.length_m() / WALL_POINT_M).ceil().max(1.0) as u32;
-            let places =
-                (0..=pieces).map(|piece| wall.a + wall.vector() * (f64::from(piece) / f64::from(pieces)));
-            let near = places.filter(|place| (place - pose.position()).norm() < WALLS_WITHIN_M);
+            let near =
+                wall.points(WALL_POINT_M).filter(|place| (place - pose.position()).norm() < WALLS_WITHIN_M);
             self.walls.extend(near.map(|place| here.transform(pose.inverse_transform(place))));
         }
         let distance_m = |wall: &&Segment| wall.distance_m(pose.position());
@@ -207,9 +143,8 @@ impl Surround {
         let is_held = blind || self.here.is_none() || allowed != [0.0; 2];
         if let Some(last) = last.filter(|last| still(*last) && is_held) {
             let held = now.since(last.0);
-            for point in self.points.iter_mut().chain(&mut self.assumed) {
-                point.seen = point.seen.after(held);
-            }
+            self.points.hold(held);
+            self.assumed.hold(held);
         }
         if wanted == [0.0; 2] || allowed != [0.0; 2] {
             self.stuck_since = None;
@@ -242,7 +177,7 @@ impl Surround {
         if along.abs() > 0.5 {
             for step in 1..=FURNITURE_POINTS {
                 let way_m = FURNITURE_M * f64::from(step) / f64::from(FURNITURE_POINTS);
-                add(&mut self.assumed, now, place + axis * (way_m * along.signum()));
+                self.assumed.add(now, place + axis * (way_m * along.signum()));
             }
         }
     }
@@ -277,28 +212,19 @@ impl Surround {
     fn is_clear(&self, here: Pose2, [left, right]: Wheels, margin_m: f64, params: &Params) -> bool {
         let step_s = TRIED_S / f64::from(TRIES);
         let (step_m, turn_rad) = (0.5 * (left + right) * step_s, (right - left) / params.track_m * step_s);
-        let points = self.points.iter().chain(&self.assumed);
+        let hull = params.hull();
+        let points = self.points.iter().chain(self.assumed.iter());
         let places = points.map(|point| point.place).chain(self.walls.iter().copied());
         places.into_iter().all(|place| {
-            let now_m = distance_m(here, place, params);
+            let now_m = hull.distance_m(here, place);
             let noise_m = if now_m > 0.5 * params.keep_away_m { NOISE_M } else { 0.0 };
             let least_m = margin_m.min(now_m - noise_m);
             let mut pose = here;
             (0..TRIES).all(|_| {
                 pose = pose.after_arc(step_m, turn_rad);
-                distance_m(pose, place, params) >= least_m
+                hull.distance_m(pose, place) >= least_m
             })
         })
-    }
-}
-
-fn add(points: &mut Vec<Point>, now: Time, place: Point2<f64>) {
-    let known = points.iter_mut().find(|point| (point.place - place).norm() < ONE_POINT_M);
-    if let Some(point) = known {
-        point.seen = now;
-        point.weight = (point.weight + SIGHTING).min(WEIGHT_MAX);
-    } else if points.len() < POINTS_MAX {
-        points.push(Point { place, seen: now, weight: SIGHTING });
     }
 }
 
@@ -337,17 +263,10 @@ fn limited(wheels: Wheels) -> Wheels {
     if fastest_mps > SLOW_MPS { wheels.map(|speed| speed * SLOW_MPS / fastest_mps) } else { wheels }
 }
 
-/// From the body to a place; 0 inside.
-fn distance_m(body: Pose2, place: Point2<f64>, params: &Params) -> f64 {
-    let local = body.inverse_transform(place);
-    let ahead_m = (local.x - params.hull_front_m).max(-params.hull_rear_m - local.x).max(0.0);
-    let aside_m = (local.y.abs() - params.hull_side_m).max(0.0);
-    ahead_m.hypot(aside_m)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use messages::TOF_COUNT;
     use std::f64::consts::FRAC_PI_2;
 
     fn coffee() -> Params {
@@ -451,7 +370,7 @@ mod kept {
         successor.restore(&serde_json::from_str(&text).unwrap());
         assert_eq!(successor.snapshot(), first.snapshot());
         // A millimetre is as fine as the sensors are.
-        for (a, b) in first.points.iter().zip(&successor.points) {
+        for (a, b) in first.points.iter().zip(successor.points.iter()) {
             assert!((a.place - b.place).norm() < 1e-3 && a.weight == b.weight);
         }
     }

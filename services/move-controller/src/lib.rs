@@ -51,7 +51,7 @@ pub struct MoveController {
 /// What the guard's word means for a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Ahead {
-    /// Free, with the nearest thing so far away.
+    /// Free, with the nearest thing so far beyond the place where the guard stops the robot; negative where that is unclear.
     Free(f64),
     /// Something is too near.
     TooNear,
@@ -133,7 +133,9 @@ fn is_finite(odometry: &Odometry) -> bool {
 fn ahead(now: Time, clearance: Option<Stamped<'_, Clearance>>) -> Ahead {
     let Some(word) = clearance.and_then(|word| word.fresh(now, MAX_AGE)) else { return Ahead::Unknown };
     match (word.signal.get(), word.reason.get()) {
-        (Ok(Verdict::Go), Ok(_)) if !word.front_m.is_nan() => Ahead::Free(word.front_m.into()),
+        (Ok(Verdict::Go), Ok(_)) if !(word.front_m - word.front_radius_m).is_nan() => {
+            Ahead::Free(f64::from(word.front_m) - f64::from(word.front_radius_m))
+        }
         (Ok(Verdict::Stop), Ok(GuardReasonName::Violation)) => Ahead::TooNear,
         _ => Ahead::Unknown,
     }

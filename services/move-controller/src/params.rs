@@ -39,10 +39,7 @@ pub struct Params {
     /// A turn that is smaller than ordered by no more than this is done.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub turn_tolerance_rad: f64,
-    /// What the guard stops for: there the robot would have to stand.
-    #[schemars(range(min = 0.01, max = 2.0))]
-    pub stop_distance_m: f64,
-    /// Speed for each metre that lies between the robot and that distance.
+    /// Speed for each metre between the robot and where the guard would stop it.
     #[schemars(range(min = 0.1, max = 20.0))]
     pub approach_per_s: f64,
     /// How far the robot drives back from a wall that is too near, unless the order says less.
@@ -69,7 +66,6 @@ impl Default for Params {
             creep_rad_per_s: 0.08,
             tolerance_m: 0.0005,
             turn_tolerance_rad: 0.003,
-            stop_distance_m: 0.09,
             approach_per_s: 2.0,
             retreat_m: 0.10,
             retreat_speed_mps: 0.10,
@@ -125,10 +121,7 @@ impl Params {
     /// No faster ahead than what lies there allows; not at all while nobody knows.
     pub(crate) fn approach_mps(&self, ahead: Ahead) -> f64 {
         match ahead {
-            Ahead::Free(front_m) => {
-                let slow_mps = self.approach_per_s * (front_m - self.stop_distance_m);
-                slow_mps.clamp(self.creep_mps, self.speed_mps)
-            }
+            Ahead::Free(free_m) => (self.approach_per_s * free_m).clamp(self.creep_mps, self.speed_mps),
             Ahead::TooNear | Ahead::Unknown => 0.0,
         }
     }
@@ -149,7 +142,6 @@ impl messages::Parameters for Params {
             ("creep_rad_per_s", self.creep_rad_per_s, 0.005, 1.0),
             ("tolerance_m", self.tolerance_m, 0.0, 0.02),
             ("turn_tolerance_rad", self.turn_tolerance_rad, 0.0, 0.1),
-            ("stop_distance_m", self.stop_distance_m, 0.01, 2.0),
             ("approach_per_s", self.approach_per_s, 0.1, 20.0),
             ("retreat_m", self.retreat_m, 0.0, 1.0),
             ("retreat_speed_mps", self.retreat_speed_mps, 0.01, 0.3),

@@ -11,6 +11,13 @@ pub struct Params {
     /// Nothing ahead may be nearer to the sensor, which sits above the centre of motion: half of the robot's length and a centimetre.
     #[schemars(range(min = 0.01, max = 2.0))]
     pub stop_distance_m: f64,
+    /// From the centre of motion, above which the sensor sits, to the hull's front edge.
+    #[schemars(range(min = 0.005, max = 2.0))]
+    pub hull_front_m: f64,
+    /// After so long a way without a single echo, ahead or in a scan, the sensor counts as deaf, and before the first one it was never
+    /// heard to hear: STOP. 0 does not look, for places that are larger than the sensor's range.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub deaf_way_m: f64,
     /// Readings older than this count for nothing.
     #[schemars(range(min = 10, max = 1000))]
     pub max_age_ms: u32,
@@ -21,7 +28,7 @@ pub struct Params {
 
 impl Default for Params {
     fn default() -> Self {
-        Self { stop_distance_m: 0.09, max_age_ms: 100, period_ms: 40 }
+        Self { stop_distance_m: 0.09, hull_front_m: 0.08, deaf_way_m: 3.0, max_age_ms: 100, period_ms: 40 }
     }
 }
 
@@ -39,6 +46,16 @@ pub enum ParamsError {
         min: f64,
         /// Largest possible value.
         max: f64,
+    },
+    /// A threshold within the robot.
+    #[error(
+        "stop_distance_m = {stop_m} is not above hull_front_m = {hull_m}, so the robot would touch before it stops; raise the first"
+    )]
+    StopsTooLate {
+        /// The threshold.
+        stop_m: f64,
+        /// The hull's front edge.
+        hull_m: f64,
     },
 }
 
@@ -60,11 +77,16 @@ impl messages::Parameters for Params {
     fn check(&self) -> Result<(), ParamsError> {
         let ranges = [
             ("stop_distance_m", self.stop_distance_m, 0.01, 2.0),
+            ("hull_front_m", self.hull_front_m, 0.005, 2.0),
+            ("deaf_way_m", self.deaf_way_m, 0.0, 1000.0),
             ("max_age_ms", self.max_age_ms.into(), 10.0, 1000.0),
             ("period_ms", self.period_ms.into(), 5.0, 100.0),
         ];
         match ranges.iter().find(|(_, value, min, max)| !(min..=max).contains(&value)) {
             Some(&(name, value, min, max)) => Err(ParamsError::OutOfRange { name, value, min, max }),
+            None if self.stop_distance_m <= self.hull_front_m => {
+                Err(ParamsError::StopsTooLate { stop_m: self.stop_distance_m, hull_m: self.hull_front_m })
+            }
             None => Ok(()),
         }
     }
