@@ -20,8 +20,12 @@ pub use items::{
 pub use scene::{WorldBodies, WorldScene};
 
 use crate::{Pose2, Segment};
+use files::{FileError, FileProblem};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+
+/// The largest building of ours has 11 KiB, and one with as much of everything as is allowed has 1.5 MiB.
+const FILE_MAX: u64 = 2 << 20;
 
 /// A building, or a single arena: everything that does not depend on time. What moves (door leaves, walkers) is described
 /// by how it moves; [`Door::opening_fraction`] and [`Walker::pose`] say where it is.
@@ -67,8 +71,8 @@ pub enum WorldError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
-        cause: std::io::Error,
+        /// Why.
+        cause: FileProblem,
     },
     /// The text is no TOML, or a field is missing, unknown or of the wrong type.
     #[error("{}line {line}, column {column}: {message}", in_file(path.as_deref()))]
@@ -106,6 +110,28 @@ pub enum WorldProblem {
     /// A world without a floor.
     #[error("a world needs at least one [[floor]]")]
     NoFloor,
+    /// More of something than a world may hold.
+    #[error(
+        "{count} {what} are more than the {most} that a world may hold; leave out what this robot does not meet"
+    )]
+    TooMany {
+        /// What, in words.
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+        /// How many there may be.
+        most: usize,
+    },
+    /// A start or place that no robot within the outline is at.
+    #[error("({x_m}, {y_m}) lies outside of the outline of floor {floor}")]
+    OutsideOutline {
+        /// The floor's number.
+        floor: i32,
+        /// The place.
+        x_m: f64,
+        /// The place.
+        y_m: f64,
+    },
     /// Two things of a kind bear one name or number.
     #[error("{what} is already taken by an earlier entry")]
     Duplicate {
@@ -204,8 +230,8 @@ impl World {
     /// Reads and checks a world file.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, WorldError> {
         let file = path.as_ref();
-        let text = std::fs::read_to_string(file)
-            .map_err(|cause| WorldError::Unreadable { path: file.to_owned(), cause })?;
+        let text = files::read_text(file, FILE_MAX)
+            .map_err(|FileError { path, problem }| WorldError::Unreadable { path, cause: problem })?;
         Self::parse(&text).map_err(|error| error.in_path(file))
     }
 
