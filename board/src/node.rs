@@ -338,10 +338,12 @@ impl Node {
         self.period = Some(period.max(Duration::from_micros(10)));
     }
 
-    /// Says that all ports are declared, and that what follows may take its time, such as reading a map. Hand the result on with `?`.
+    /// Says that all ports are declared, and that what follows may take its time, such as reading a map. Hand
+    /// the result on with `?`.
     ///
-    /// A service that is only asked for its interface goes no further, so what it is does not wait for its data. What stands before
-    /// should be quick, and refuse what is wrong: parameters, a map's header, a log that is not there.
+    /// A service that is only asked for its interface goes no further, so what it is does not wait for its
+    /// data. What stands before should be quick, and refuse what is wrong: parameters, a map's header, a log
+    /// that is not there.
     ///
     /// # Errors
     /// When the service is only asked for its interface.

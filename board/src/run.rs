@@ -33,8 +33,8 @@ const HEALTH_PERIOD: Duration = Duration::from_secs(1);
 /// Runs a service: reads its command line, joins its board, lets `setup` declare ports and build the step, and takes steps until
 /// it is asked to leave.
 ///
-/// `setup` is also run without a board and with default parameters, to answer `--interface`, up to [`Node::declared`]; it must have
-/// no effect before its first step.
+/// `setup` is also run without a board and with default parameters, to answer `--interface`, up to
+/// [`Node::declared`]; it must have no effect before its first step.
 pub fn run<P, S>(about: About, setup: impl Fn(&mut Node, P) -> Result<S, SetupError>) -> ExitCode
 where
     P: Parameters,

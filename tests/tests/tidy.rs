@@ -110,11 +110,9 @@ fn the_launcher_depends_on_no_service() {
 
 #[test]
 fn schemas_know_neither_board_nor_services() {
-    for (crate_name, allowed) in [
-        ("files", &[][..]),
-        ("geometry", &["files"][..]),
-        ("messages", &["geometry", "messages-derive"][..]),
-    ] {
+    for (crate_name, allowed) in
+        [("files", &[][..]), ("geometry", &["files"][..]), ("messages", &["geometry", "messages-derive"][..])]
+    {
         let inside = ["board", "launch", "tests", "files", "geometry", "messages", "messages-derive"];
         for dependency in dependencies(&root().join("schemas").join(crate_name)) {
             let ours = inside.contains(&dependency.as_str());

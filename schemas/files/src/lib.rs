@@ -1,8 +1,10 @@
-//! Files that people hand in and get back: plain files only, read within a limit, and written as a whole or not at all.
+//! Files that people hand in and get back: plain files only, read within a limit, and written as a whole or
+//! not at all.
 //!
-//! Whatever reads a file of a user's does it through here. A pipe or a device in a file's place is refused instead of waited for, and
-//! nothing is taken into memory that is larger than its reader has allowed for. What is written appears under its name only when
-//! all of it is on the disk, and takes the place of nothing but a plain file.
+//! Whatever reads a file of a user's does it through here. A pipe or a device in a file's place is refused
+//! instead of waited for, and nothing is taken into memory that is larger than its reader has allowed for.
+//! What is written appears under its name only when all of it is on the disk, and takes the place of nothing
+//! but a plain file.
 
 mod read;
 mod write;

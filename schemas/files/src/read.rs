@@ -29,7 +29,8 @@ pub fn open(path: &Path, limit: u64) -> Result<File, FileError> {
     Ok(file)
 }
 
-/// Whether [`open`] would open it, without reading anything: for set-ups that are checked before they are used.
+/// Whether [`open`] would open it, without reading anything: for set-ups that are checked before they are
+/// used.
 ///
 /// # Errors
 /// As of `open`.
@@ -95,8 +96,8 @@ pub struct Unpacked {
     pub damage: Option<String>,
 }
 
-/// The bytes of a plain file, unpacked if it begins as gzip does; at most `limit` bytes before and after. Of a file whose compression is
-/// damaged the part before is kept.
+/// The bytes of a plain file, unpacked if it begins as gzip does; at most `limit` bytes before and after. Of
+/// a file whose compression is damaged the part before is kept.
 ///
 /// # Errors
 /// As of [`read`], or when more than `limit` bytes come out.

@@ -7,7 +7,8 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// A file that is written and on the disk, but not yet under its name. Dropped before, it leaves nothing behind.
+/// A file that is written and on the disk, but not yet under its name. Dropped before, it leaves nothing
+/// behind.
 #[derive(Debug)]
 pub struct Draft {
     beside: PathBuf,
@@ -74,8 +75,8 @@ impl Drop for Draft {
     }
 }
 
-/// Whether a file can be written there: its folder exists and may be written, and nothing but a plain file has its name. For set-ups that
-/// are checked before they are used.
+/// Whether a file can be written there: its folder exists and may be written, and nothing but a plain file
+/// has its name. For set-ups that are checked before they are used.
 ///
 /// # Errors
 /// When it could not be.

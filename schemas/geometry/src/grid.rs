@@ -10,10 +10,11 @@ pub use traverse::{CellsAlong, CellsBetween};
 use crate::Pose2;
 use nalgebra::Point2;
 
-/// No grid has more cells than this (a square of 8192, at 5 cm one of 409 m): what is worked out for each cell then still fits into the
-/// memory of a robot's computer.
+/// No grid has more cells than this (a square of 8192, at 5 cm one of 409 m): what is worked out for each
+/// cell then still fits into the memory of a robot's computer.
 pub const MOST_CELLS: u64 = 1 << 26;
-/// No grid has more columns or rows than this, so that a column or row and its neighbour stay apart in single precision.
+/// No grid has more columns or rows than this, so that a column or row and its neighbour stay apart in single
+/// precision.
 pub const LONGEST_SIDE: u32 = (1 << 24) - 2;
 
 /// Why a grid cannot be.
@@ -69,7 +70,8 @@ impl Cell {
     }
 }
 
-/// Where the cells of a grid lie, as in ROS: the origin is the outer corner of cell (0, 0), rows follow each other along y.
+/// Where the cells of a grid lie, as in ROS: the origin is the outer corner of cell (0, 0), rows follow each
+/// other along y.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridFrame {
     width: u32,
@@ -81,8 +83,8 @@ pub struct GridFrame {
 }
 
 impl GridFrame {
-    /// A grid of `width` columns and `height` rows of square cells with sides of `resolution_m`, whose outer corner and x
-    /// axis lie at `origin`.
+    /// A grid of `width` columns and `height` rows of square cells with sides of `resolution_m`, whose outer
+    /// corner and x axis lie at `origin`.
     pub fn new(width: u32, height: u32, resolution_m: f64, origin: Pose2) -> Result<Self, GridError> {
         let cells = u64::from(width) * u64::from(height);
         if cells == 0 || cells > MOST_CELLS || width.max(height) > LONGEST_SIDE {

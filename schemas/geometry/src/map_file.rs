@@ -1,14 +1,15 @@
 //! Maps as files: the YAML and image pair of the ROS map servers.
 //!
-//! The YAML names the image and says what its pixels mean: `image` (its path, relative to the YAML), `resolution` (metres a
-//! pixel), `origin` ([x, y, yaw] of the outer corner of the lower left pixel), `negate` (0 or 1: dark is free), `mode`
-//! (`trinary`, `scale`, `raw`; trinary when left out), `occupied_thresh`, `free_thresh`. The image's first row is the map's
-//! last. Other keys and whatever stands below them are ignored, as map servers do.
+//! The YAML names the image and says what its pixels mean: `image` (its path, relative to the YAML),
+//! `resolution` (metres a pixel), `origin` ([x, y, yaw] of the outer corner of the lower left pixel),
+//! `negate` (0 or 1: dark is free), `mode` (`trinary`, `scale`, `raw`; trinary when left out),
+//! `occupied_thresh`, `free_thresh`. The image's first row is the map's last. Other keys and whatever stands
+//! below them are ignored, as map servers do.
 //!
-//! Map servers differ in what they make of colours and transparency. This reader does as `map_server` of ROS 1 and as nav2 up to
-//! Iron: colours are averaged, in trinary maps the opacity along with them. (nav2 since Jazzy weighs colours by luminance, and
-//! takes what is not fully opaque for unknown in trinary maps too.) Indexed images have the colours of their palette, and 16 bits
-//! count in full, as in nav2.
+//! Map servers differ in what they make of colours and transparency. This reader does as `map_server` of ROS
+//! 1 and as nav2 up to Iron: colours are averaged, in trinary maps the opacity along with them. (nav2 since
+//! Jazzy weighs colours by luminance, and takes what is not fully opaque for unknown in trinary maps too.)
+//! Indexed images have the colours of their palette, and 16 bits count in full, as in nav2.
 
 mod image_file;
 mod save;
@@ -24,7 +25,8 @@ use yaml::{Entry, Value};
 /// A YAML of a map has a few hundred bytes; this leaves room for the notes of a lifetime.
 const YAML_MAX: u64 = 256 << 10;
 
-/// Metres a pixel: below, a robot's map has more cells than any computer's memory; above, a robot fits between two of them.
+/// Metres a pixel: below, a robot's map has more cells than any computer's memory; above, a robot fits
+/// between two of them.
 const RESOLUTION_M: std::ops::RangeInclusive<f64> = 0.001..=10.0;
 
 /// No place on earth lies farther from a map's origin, in metres.
@@ -33,14 +35,15 @@ const FARTHEST_M: f64 = 1e8;
 /// What a pixel means. With p = 1 - brightness (brightness itself if negated), both from 0 to 1:
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MapMode {
-    /// p above `occupied_thresh` is occupied, below `free_thresh` free, and between unknown. The opacity of an image that has
-    /// one is averaged into the brightness as a fourth colour.
+    /// p above `occupied_thresh` is occupied, below `free_thresh` free, and between unknown. The opacity of
+    /// an image that has one is averaged into the brightness as a fourth colour.
     #[default]
     Trinary,
-    /// The same outside of the thresholds; between them the probability rises in proportion. A pixel that is not fully
-    /// opaque is unknown.
+    /// The same outside of the thresholds; between them the probability rises in proportion. A pixel that is
+    /// not fully opaque is unknown.
     Scale,
-    /// The pixel's brightness, 0 to 255, is the per cent; what is above 100 is unknown. Neither `negate` nor opacity counts.
+    /// The pixel's brightness, 0 to 255, is the per cent; what is above 100 is unknown. Neither `negate` nor
+    /// opacity counts.
     Raw,
 }
 
@@ -318,8 +321,9 @@ impl OccupancyGrid {
             .map_err(|problem| MapError { path: image.path, problem })
     }
 
-    /// How large the map is that a YAML file describes, and where it lies. Reads no pixels: what is wrong with the YAML, and an image
-    /// that is not there, too large or of an unknown kind, is found as by [`OccupancyGrid::load`].
+    /// How large the map is that a YAML file describes, and where it lies. Reads no pixels: what is wrong
+    /// with the YAML, and an image that is not there, too large or of an unknown kind, is found as by
+    /// [`OccupancyGrid::load`].
     pub fn look(path: impl AsRef<Path>) -> Result<GridFrame, MapError> {
         let (header, mut image) = open(path.as_ref())?;
         image_file::frame(&header, &mut image.reader)

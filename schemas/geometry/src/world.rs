@@ -1,10 +1,11 @@
 //! World files: floor plans, arenas, furniture and walkers, as TOML.
 //!
-//! One file serves everybody: the simulator casts rays into it, the planners read its walls and areas, the localiser its tag
-//! anchors, the launcher's view draws it. A complete, commented example lies in `tests/example-world.toml` of this crate.
+//! One file serves everybody: the simulator casts rays into it, the planners read its walls and areas, the
+//! localiser its tag anchors, the launcher's view draws it. A complete, commented example lies in
+//! `tests/example-world.toml` of this crate.
 //!
-//! Frame: one right-handed plane for all floors (x and y of an elevator shaft agree on each), z up from the floor in
-//! question. Metres, radians, seconds.
+//! Frame: one right-handed plane for all floors (x and y of an elevator shaft agree on each), z up from the
+//! floor in question. Metres, radians, seconds.
 
 mod check;
 mod door;
@@ -27,8 +28,8 @@ use std::path::{Path, PathBuf};
 /// The largest building of ours has 11 KiB, and one with as much of everything as is allowed has 1.5 MiB.
 const FILE_MAX: u64 = 2 << 20;
 
-/// A building, or a single arena: everything that does not depend on time. What moves (door leaves, walkers) is described
-/// by how it moves; [`Door::opening_fraction`] and [`Walker::pose`] say where it is.
+/// A building, or a single arena: everything that does not depend on time. What moves (door leaves, walkers)
+/// is described by how it moves; [`Door::opening_fraction`] and [`Walker::pose`] say where it is.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct World {
@@ -235,8 +236,9 @@ impl World {
         Self::parse(&text).map_err(|error| error.in_path(file))
     }
 
-    /// Refuses nonsense: unknown floors, equal names, doors outside walls, numbers that are not finite or not positive.
-    /// [`World::parse`] and [`World::load`] have done so already; a world built in code has to be checked.
+    /// Refuses nonsense: unknown floors, equal names, doors outside walls, numbers that are not finite or not
+    /// positive. [`World::parse`] and [`World::load`] have done so already; a world built in code has to be
+    /// checked.
     pub fn check(&self) -> Result<(), WorldError> {
         self.find_problem().map_or(Ok(()), |found| {
             Err(WorldError::Nonsense { path: None, line: 0, item: found.item, problem: found.problem })
@@ -274,8 +276,8 @@ impl World {
         self.areas.iter().filter(move |area| area.floor == floor && kind.is_none_or(|kind| area.kind == kind))
     }
 
-    /// The exact lines of a door: gap, jambs, recessed leaf and room. `None` when no wall holds the door, which
-    /// [`World::check`] refuses.
+    /// The exact lines of a door: gap, jambs, recessed leaf and room. `None` when no wall holds the door,
+    /// which [`World::check`] refuses.
     pub fn door_geometry(&self, door: &Door) -> Option<DoorGeometry> {
         DoorGeometry::cut(self.floor(door.floor)?, &door.opening())
     }
@@ -286,8 +288,8 @@ impl World {
         if stops { DoorGeometry::cut(self.floor(floor)?, &elevator.opening()) } else { None }
     }
 
-    /// Everything on a floor that stands still and reaches from floor to ceiling: walls with gaps where doors are, jambs, and
-    /// the rooms behind the doors. Door leaves are not among it.
+    /// Everything on a floor that stands still and reaches from floor to ceiling: walls with gaps where doors
+    /// are, jambs, and the rooms behind the doors. Door leaves are not among it.
     pub fn wall_segments(&self, floor: i32) -> Vec<Segment> {
         let Some(plan) = self.floor(floor) else { return Vec::new() };
         let openings: Vec<_> = self.openings_of(floor).collect();

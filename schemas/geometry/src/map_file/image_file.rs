@@ -88,7 +88,8 @@ fn weigh<S, const N: usize>(
     cells
 }
 
-/// Refuses a PNM file that holds more than its pixels: then nothing says where they begin. A line's end after the last is no surplus.
+/// Refuses a PNM file that holds more than its pixels: then nothing says where they begin. A line's end after
+/// the last is no surplus.
 fn check_surplus(file: &mut BufReader<File>) -> Result<(), MapProblem> {
     file.seek(SeekFrom::Start(0)).map_err(io)?;
     let is_pnm = image::guess_format(file.fill_buf().map_err(io)?).is_ok_and(|kind| kind == ImageFormat::Pnm);

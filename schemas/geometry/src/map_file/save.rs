@@ -54,17 +54,18 @@ impl OccupancyGrid {
         Ok(files::check_place(&image)?)
     }
 
-    /// Writes the map as a YAML file and, beside it, an image of the same name with the extension `pgm` or `png`. Plain files that were
-    /// there before are replaced; should anything fail, they stay.
+    /// Writes the map as a YAML file and, beside it, an image of the same name with the extension `pgm` or
+    /// `png`. Plain files that were there before are replaced; should anything fail, they stay.
     ///
-    /// Trinary maps hold cells of 0, 100 and unknown only, scaled maps need PNG for unknown cells; raw maps hold everything.
+    /// Trinary maps hold cells of 0, 100 and unknown only, scaled maps need PNG for unknown cells; raw maps
+    /// hold everything.
     pub fn save(&self, yaml: impl AsRef<Path>, mode: MapMode, image: MapImage) -> Result<(), MapError> {
         let yaml = yaml.as_ref();
         Self::check_save(yaml, image)?;
         let in_yaml = |problem| MapError { path: yaml.to_owned(), problem };
         let image_path = image.beside(yaml).map_err(in_yaml)?;
-        // In trinary maps the usual grey of unknown cells, 205, lies just above this free_thresh. Scaled maps use the whole
-        // range between black and white.
+        // In trinary maps the usual grey of unknown cells, 205, lies just above this free_thresh. Scaled maps
+        // use the whole range between black and white.
         let (occupied_thresh, free_thresh) = match mode {
             MapMode::Trinary => (0.65, 0.196),
             MapMode::Scale | MapMode::Raw => (1.0, 0.0),

@@ -1,5 +1,5 @@
-//! The keys of a map's YAML. Only values that can mean something to a map are kept: a word, a text, or a flat list of them. Whatever
-//! else stands below a key is skipped, however deep, and never expanded.
+//! The keys of a map's YAML. Only values that can mean something to a map are kept: a word, a text, or a flat
+//! list of them. Whatever else stands below a key is skipped, however deep, and never expanded.
 
 use saphyr_parser::{Event, Parser, ScanError, StrInput};
 use std::borrow::Cow;
@@ -151,7 +151,8 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The same text with a blank for each tab between a key and its value, which the parser does not take for white space.
+/// The same text with a blank for each tab between a key and its value, which the parser does not take for
+/// white space.
 fn without_tabs_after_keys(text: &str) -> Cow<'_, str> {
     if !text.contains(":\t") {
         return Cow::Borrowed(text);

@@ -10,7 +10,8 @@ use toml::Spanned;
 /// Farther out than this no coordinate lies, in metres.
 const FARTHEST_M: f64 = 10_000.0;
 
-/// As much as no building has that a robot drives through, and little enough that each thing can be compared with every other.
+/// As much as no building has that a robot drives through, and little enough that each thing can be compared
+/// with every other.
 const MOST_OF_A_KIND: usize = 1000;
 /// Straight pieces of wall of a whole world.
 const MOST_WALLS: usize = 20_000;
