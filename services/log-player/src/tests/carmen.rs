@@ -65,13 +65,13 @@ fn check_version(settings: &str, rest: &str) {
     assert_eq!(log.problems, [], "{settings} {rest}");
     let (sensor, first, step, range_max_m) = scans(&log, 1);
     assert!((sensor.x_m - 0.2).abs() < 1e-9 && sensor.heading_rad == 0.0, "{sensor:?}");
-    assert_eq!((first, step, range_max_m), (-1.5707, 0.017453, Some(40.0)));
+    assert_eq!((first, step, range_max_m), (-1.55, 0.017453, Some(40.0)));
     assert_eq!(truths(&log), [Pose2::new(1.0, 2.0, 0.0)]);
 }
 
 #[test]
 fn lines_with_directions_are_read_in_every_version() {
-    let (new, old) = ("0 -1.5707 3.141593 0.017453 40 0.01 0", "0 -1.5707 3.141593 0.017453 40 0.01");
+    let (new, old) = ("0 -1.55 3.141593 0.017453 40 0.01 0", "0 -1.55 3.141593 0.017453 40 0.01");
     let poses = "1.2 2 0 1 2 0";
     for settings in [new, old] {
         for strengths in ["0 ", "3 0.5 0.6 0.7 ", ""] {
@@ -183,7 +183,7 @@ fn beams_without_an_echo_keep_their_scan() {
 
 #[test]
 fn one_laser_is_played_and_the_others_are_counted() {
-    let settings = "0 -1.5707 3.141593 0.017453 40 0.01 0";
+    let settings = "0 -1.55 3.141593 0.017453 40 0.01 0";
     let front = robot_laser("ROBOTLASER1", settings, "0 1 0 0 1 0 0 0 0 0.5 0.3 0.2");
     let rear = robot_laser("ROBOTLASER2", settings, "0 0.8 0 3.141592653589793 1 0 0 0 0 0.5 0.3 0.2");
     let raw = format!("RAWLASER1 {settings} {} 0 10.5 h 10.5\n", beams(181));
