@@ -27,7 +27,8 @@ pub struct Beyond {
 #[derive(Debug, Clone)]
 pub struct Map {
     frame: GridFrame,
-    /// Thousandths; 0 where nothing is known, or as much speaks for as against. Behind the last row lies one block more.
+    /// Thousandths; 0 where nothing is known, or as much speaks for as against. Behind the last row lies one
+    /// block more.
     cells: Vec<i16>,
     hit: i16,
     clamp: i16,
@@ -85,8 +86,9 @@ impl Map {
         map
     }
 
-    /// Takes in a scan that was taken at a pose of the robot: each cell is changed at most once, cells in which a beam ends towards
-    /// occupied, others that a beam passes towards free. `false` when the scan cannot be used.
+    /// Takes in a scan that was taken at a pose of the robot: each cell is changed at most once, cells in
+    /// which a beam ends towards occupied, others that a beam passes towards free. `false` when the scan
+    /// cannot be used.
     pub fn add(&mut self, robot: Pose2, scan: &RangeScan, ranges: &[f32]) -> bool {
         if self.sectors.read(&self.frame, &self.limits, robot, scan, ranges).is_none() {
             return false;
@@ -155,7 +157,8 @@ impl Map {
         })
     }
 
-    /// The same with every cell occupied, free or unknown, as trinary map files have it: occupied above 0.65, free below 0.196.
+    /// The same with every cell occupied, free or unknown, as trinary map files have it: occupied above 0.65,
+    /// free below 0.196.
     pub fn to_trinary_grid(&self) -> OccupancyGrid {
         self.known(|value| match probability(f64::from(value) / PER_UNIT) {
             occupied if occupied > 0.65 => Occupancy::OCCUPIED,
@@ -173,7 +176,8 @@ impl Map {
     }
 }
 
-/// Changes the cells of a row that beams passed, block by block. The last block may reach beyond them, where it changes nothing.
+/// Changes the cells of a row that beams passed, block by block. The last block may reach beyond them, where
+/// it changes nothing.
 fn pass(row: &mut [i16], [first, end]: [usize; 2], misses: &[i16; 2 * LANES], least: i16) {
     let mut at = first;
     while at < end {

@@ -12,10 +12,11 @@ pub const SAVED_AS: MapImage = MapImage::Pgm;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
-    /// ROS map file (YAML) to begin with; empty begins with nothing known. Its size and place replace those below.
+    /// ROS map file (YAML) to begin with; empty begins with nothing known. Its size and place replace those
+    /// below.
     pub load: String,
-    /// ROS map file (YAML) that is written, with an image beside it, at the end; empty for none. The run fails
-    /// when it cannot be.
+    /// ROS map file (YAML) that is written, with an image beside it, at the end; empty for none. The run
+    /// fails when it cannot be.
     pub save: String,
     /// The map is also written this often while it changes, so that less is lost; 0 for at the end only.
     #[schemars(range(min = 0.0, max = 3600.0))]
@@ -35,7 +36,8 @@ pub struct Params {
     /// Extent along y.
     #[schemars(range(min = 0.1, max = 2000.0))]
     pub height_m: f64,
-    /// The floor that is mapped; poses on other floors are left out. Nothing for whatever floor the robot is on.
+    /// The floor that is mapped; poses on other floors are left out. Nothing for whatever floor the robot is
+    /// on.
     pub floor: Option<i32>,
     /// What a reading says of the cell in which it ends: the probability that it is occupied (X-4B).
     #[schemars(range(min = 0.51, max = 0.99))]
@@ -49,8 +51,8 @@ pub struct Params {
     /// Readings are used up to here; one that sees something farther away only clears as far.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub range_max_m: f64,
-    /// A beam that sees nothing within its sensor's range clears as far, at most up to `range_max_m`; 0 when it may have been swallowed by
-    /// glass or black paint, and tells nothing.
+    /// A beam that sees nothing within its sensor's range clears as far, at most up to `range_max_m`; 0 when
+    /// it may have been swallowed by glass or black paint, and tells nothing.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub clear_max_m: f64,
     /// A beam speaks for what lies within its width, and no farther than halfway to the next beam.
@@ -160,8 +162,8 @@ impl messages::Parameters for Params {
 }
 
 impl Params {
-    /// Whether the files that are named can be used: the map to begin with by its head, and the place where the
-    /// map is to be saved. Reads no map, and writes nothing.
+    /// Whether the files that are named can be used: the map to begin with by its head, and the place where
+    /// the map is to be saved. Reads no map, and writes nothing.
     ///
     /// # Errors
     /// When one of them could not be.
