@@ -21,6 +21,9 @@ pub fn read(text: &str) -> Result<System, FclError> {
     }
 }
 
+/// A variable's name, and its range where that stands beside the declaration.
+type Declared = (String, Option<(f64, f64)>);
+
 pub(super) struct Parser {
     tokens: Vec<Placed>,
     next: usize,
@@ -201,8 +204,8 @@ impl Parser {
     }
 
     /// `name : REAL;` until END_VAR, each with the range that may follow it; `a, b : REAL;` declares two.
-    fn declarations(&mut self, system: &System) -> Result<Vec<(String, Option<(f64, f64)>)>, FclError> {
-        let mut all: Vec<(String, Option<(f64, f64)>)> = Vec::new();
+    fn declarations(&mut self, system: &System) -> Result<Vec<Declared>, FclError> {
+        let mut all: Vec<Declared> = Vec::new();
         while !self.eat("END_VAR") {
             let first = all.len();
             loop {
