@@ -23,8 +23,10 @@ pub enum Algorithm {
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// World file with the floors' walls; empty for none.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// ROS map file (YAML) used instead of a world; empty for none.
+    #[schemars(extend("format" = "path"))]
     pub map: String,
     /// The floor that the map file shows.
     pub map_floor: i32,

@@ -93,10 +93,12 @@ impl Scans {
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// The log, as text or compressed by gzip; empty plays nothing.
+    #[schemars(extend("format" = "path"))]
     pub file: String,
     /// How the log is written.
     pub format: Format,
     /// True poses beside the log, lines `row x y heading`; empty for none, or when the log holds them itself.
+    #[schemars(extend("format" = "path"))]
     pub truth: String,
     /// Row k of the true poses belongs to step k plus this.
     #[schemars(range(min = 0, max = 1000))]

@@ -14,9 +14,11 @@ pub const SAVED_AS: MapImage = MapImage::Pgm;
 pub struct Params {
     /// ROS map file (YAML) to begin with; empty begins with nothing known. Its size and place replace those
     /// below.
+    #[schemars(extend("format" = "path"))]
     pub load: String,
     /// ROS map file (YAML) that is written, with an image beside it, at the end; empty for none. The run
     /// fails when it cannot be.
+    #[schemars(extend("format" = "path"))]
     pub save: String,
     /// The map is also written this often while it changes, so that less is lost; 0 for at the end only.
     #[schemars(range(min = 0.0, max = 3600.0))]
