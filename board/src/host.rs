@@ -73,6 +73,7 @@ pub struct Host {
     manifest: Manifest,
     topics: Vec<RawTopic>,
     member: Option<Member>,
+    lockstep: bool,
     taken_down: bool,
     /// Held as long as the board is up; the kernel lets go of it however this process ends.
     _lock: File,
@@ -127,6 +128,7 @@ impl Host {
             manifest,
             topics,
             member: Some(member),
+            lockstep,
             taken_down: false,
             _lock: lock,
         })
@@ -140,6 +142,11 @@ impl Host {
     /// The shared page.
     pub fn switchboard(&self) -> &Switchboard {
         &self.switchboard
+    }
+
+    /// Whether this board lives in logical time.
+    pub fn is_lockstep(&self) -> bool {
+        self.lockstep
     }
 
     /// The table of contents.
@@ -199,6 +206,11 @@ impl Host {
                 entry.generation.store(generation, Ordering::Release);
             }
         }
+    }
+
+    /// Whether the board's folder is still the one that was made.
+    pub fn is_in_place(&self) -> bool {
+        self.place.exists()
     }
 
     /// Takes the board down and leaves nothing behind. The services must be gone.

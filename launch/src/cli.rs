@@ -39,8 +39,11 @@ pub(crate) enum Command {
     Up(UpArgs),
     /// List the services of a running graph
     Ps(StatusArgs),
-    /// Watch a running graph: rates, step times, restarts, and what happens
-    Top(StatusArgs),
+    /// Watch a running graph: the view of `launch up`, on a robot that runs already
+    #[command(visible_alias = "top", after_help = ATTACH_HELP)]
+    Attach(AttachArgs),
+    /// Say how the last run ended, and where its logs are
+    Last(LastArgs),
     /// Show what services said
     Logs(LogsArgs),
     /// Start a service of a running graph anew
@@ -64,7 +67,10 @@ pub(crate) enum Command {
         after_help = "Examples:\n  launch graph coffee > coffee.mmd\n  launch graph coffee --dot | dot -Tsvg > coffee.svg"
     )]
     Graph(GraphArgs),
-    /// Order a coffee to a room
+    /// Give an order to the robot, such as a coffee to a room
+    #[command(
+        after_help = "Exit code: 0 the robot has taken the order, 1 it has refused it or does not answer.\n\nExample:\n  launch order 211"
+    )]
     Order(OrderArgs),
     /// Hash a recording: equal for equal runs
     Digest {
@@ -113,8 +119,17 @@ Exit code: 0 the run passed or was stopped, 1 refused or failed.
 
 Examples:
   launch up coffee
-  launch up coffee --without elevator --set planner.launch.log=debug
+  launch up coffee --without referee --set planner.launch.log=debug
+  launch up coffee --stay --set navigator.default_order=\"\"      waits for orders
   launch up ./my-robot.toml --detach --board lab-2";
+
+const ATTACH_HELP: &str = "\
+The robot goes on when the view is left with q. `?` shows the keys: select a service, its log, start it anew, give an order, filter, sort; in logical time
+also pause, step and pace. Elsewhere than on a terminal it is a table a second.
+
+Examples:
+  launch attach
+  launch top --json | jq .services[].rate_hz";
 
 const EXPERIMENT_HELP: &str = "\
 Every finished run is in runs.csv at once: after an interruption the same command does the rest. Runs whose binaries, worlds or
@@ -234,9 +249,12 @@ pub(crate) struct UpArgs {
     /// The graph.
     #[command(flatten)]
     pub(crate) which: Which,
-    /// Come back at once and leave the graph running
-    #[arg(long)]
+    /// Come back when all is ready, and leave the graph running
+    #[arg(long, conflicts_with_all = ["lockstep", "plain", "no_view"])]
     pub(crate) detach: bool,
+    /// Go on when the judge has spoken: a robot that just serves, until it is stopped
+    #[arg(long, conflicts_with = "lockstep")]
+    pub(crate) stay: bool,
     /// Name the board otherwise than the graph does, to run it twice
     #[arg(long, value_name = "NAME")]
     pub(crate) board: Option<String>,
@@ -307,7 +325,32 @@ pub(crate) struct RerunArgs {
     pub(crate) no_build: bool,
 }
 
-/// `launch ps` and `launch top`.
+/// `launch attach`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct AttachArgs {
+    /// The board.
+    #[command(flatten)]
+    pub(crate) running: Running,
+    /// Print a table a second, also on a terminal
+    #[arg(long)]
+    pub(crate) plain: bool,
+    /// Print JSON, a line a second
+    #[arg(long, conflicts_with = "plain")]
+    pub(crate) json: bool,
+}
+
+/// `launch last`.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct LastArgs {
+    /// The board.
+    #[command(flatten)]
+    pub(crate) running: Running,
+    /// Print JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `launch ps`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct StatusArgs {
     /// The board.
@@ -321,9 +364,12 @@ pub(crate) struct StatusArgs {
 /// `launch logs`.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct LogsArgs {
-    /// The service; all of them without
+    /// The service, or `launch` for what happened to all of them; everybody without
     #[arg(value_name = "SERVICE")]
     pub(crate) service: Option<String>,
+    /// Of the last run, although a robot is up
+    #[arg(long, conflicts_with = "follow")]
+    pub(crate) last: bool,
     /// Go on as they speak
     #[arg(short, long)]
     pub(crate) follow: bool,
@@ -503,6 +549,49 @@ mod tests {
     #[test]
     fn the_definition_is_sound() {
         Cli::command().debug_assert();
+    }
+
+    /// Every line of a help text that begins with the command's name, without what it is for.
+    fn examples(command: &clap::Command) -> Vec<String> {
+        let mut texts: Vec<String> = [command.get_after_help(), command.get_after_long_help()]
+            .into_iter()
+            .flatten()
+            .map(ToString::to_string)
+            .collect();
+        let below: Vec<String> = command.get_subcommands().flat_map(examples).collect();
+        let own = texts.iter_mut().flat_map(|text| {
+            let lines = text.lines().map(str::trim).filter(|line| line.starts_with("launch "));
+            lines.map(|line| line.split("  ").next().unwrap_or(line).to_owned()).collect::<Vec<_>>()
+        });
+        own.collect::<Vec<_>>().into_iter().chain(below).collect()
+    }
+
+    /// The words of a line as a shell takes them, up to a pipe or a redirection.
+    fn words(line: &str) -> Vec<String> {
+        let mut words = vec![String::new()];
+        let mut quote = None;
+        for letter in line.chars() {
+            match (quote, letter) {
+                (Some(open), letter) if letter == open => quote = None,
+                (None, '\'' | '"') => quote = Some(letter),
+                (None, '|' | '>') => break,
+                (None, ' ') => words.push(String::new()),
+                (_, letter) => words.last_mut().unwrap().push(letter),
+            }
+        }
+        words.retain(|word| !word.is_empty());
+        words
+    }
+
+    #[test]
+    fn every_example_of_the_help_is_a_command() {
+        let examples = examples(&Cli::command());
+        assert!(examples.len() > 25, "{examples:?}");
+        for example in examples {
+            if let Err(error) = Cli::try_parse_from(words(&example)) {
+                panic!("`{example}`: {error}");
+            }
+        }
     }
 
     #[test]

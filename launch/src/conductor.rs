@@ -17,7 +17,7 @@ use std::time::Duration;
 const ROUNDS_MAX: u32 = 1000;
 /// How long the conductor sleeps before it looks whether somebody has died.
 const PATIENCE: Duration = Duration::from_millis(100);
-/// How long a service may take for a turn.
+/// How long a service may take for a turn, in time of its own.
 const TURN_LIMIT: Duration = Duration::from_secs(60);
 
 /// What ends a run in logical time before its end.
@@ -40,13 +40,20 @@ pub(crate) enum Discord {
         at_s: String,
     },
     /// A service does not end its turn.
-    #[error("`{role}` does not end its turn at {at_s} s")]
+    #[error(
+        "`{role}` does not end its turn at {at_s} s: it has had {own_s} s, without waiting for a processor"
+    )]
     Silent {
         /// The service.
         role: String,
         /// The instant, in seconds.
         at_s: String,
+        /// How long it had, in seconds of its own time.
+        own_s: u64,
     },
+    /// The end was asked for while somebody was in its turn.
+    #[error("interrupted")]
+    Interrupted,
     /// The recording that is played cannot be read any further.
     #[error("{0}")]
     Prompter(String),
@@ -56,6 +63,16 @@ pub(crate) enum Discord {
         /// The instant, in seconds.
         at_s: String,
     },
+}
+
+/// Who knows what the conductor cannot see.
+pub(crate) trait Attendant {
+    /// Whether a service's process lives.
+    fn lives(&mut self, role: &str) -> bool;
+    /// Whether the end of the run was asked for.
+    fn wants_to_end(&mut self) -> bool;
+    /// How long a service has been in its turn (the one with this number) without waiting for a processor; by the clock it is `waited`.
+    fn own_time(&mut self, role: &str, turn: u64, waited: Duration) -> Duration;
 }
 
 /// Gives the turns.
@@ -187,8 +204,8 @@ impl Conductor {
         self.players.iter().any(waits).then(|| Time::from_nanos(now_ns + 1))
     }
 
-    /// Plays the instant at this moment. `after_round` sees the board when a round has ended; `lives` says whether a service's process lives;
-    /// the prompter says the words of those who are not there.
+    /// Plays the instant at this moment. `after_round` sees the board when a round has ended; the attendant is asked while
+    /// somebody takes long over its turn; the prompter says the words of those who are not there.
     ///
     /// # Errors
     /// When the run cannot go on.
@@ -198,7 +215,7 @@ impl Conductor {
         at: Time,
         prompter: &mut Prompter<'_>,
         after_round: &mut dyn FnMut(Time, u32),
-        lives: &mut dyn FnMut(&str) -> bool,
+        attendant: &mut dyn Attendant,
     ) -> Result<(), Discord> {
         let board = host.switchboard();
         self.note_woken(host);
@@ -219,7 +236,7 @@ impl Conductor {
             if called.is_empty() && !prompter.has_more_at(self.now, round) {
                 return Ok(());
             }
-            self.give_turns(host, round, &called, lives)?;
+            self.give_turns(host, round, &called, attendant)?;
             for &index in &called {
                 let player = &mut self.players[index];
                 if player.computes_until_ns.take().is_none() {
@@ -262,7 +279,7 @@ impl Conductor {
         host: &Host,
         round: u32,
         called: &[usize],
-        lives: &mut dyn FnMut(&str) -> bool,
+        attendant: &mut dyn Attendant,
     ) -> Result<(), Discord> {
         if called.is_empty() {
             return Ok(());
@@ -288,6 +305,9 @@ impl Conductor {
             if header.outstanding.load(Ordering::Acquire) == 0 {
                 return Ok(());
             }
+            if attendant.wants_to_end() {
+                return Err(Discord::Interrupted);
+            }
             // Rung by a joining service, or patience is at an end: is anybody missing?
             let now = clock::monotonic();
             let began = *began.get_or_insert(now);
@@ -299,11 +319,13 @@ impl Conductor {
                     continue;
                 }
                 let at_s = seconds(self.now);
-                if slot.state() != SlotState::Running || !lives(&player.role) {
+                if slot.state() != SlotState::Running || !attendant.lives(&player.role) {
                     return Err(Discord::Died { role: player.role.clone(), at_s });
                 }
-                if now.since(began) > TURN_LIMIT {
-                    return Err(Discord::Silent { role: player.role.clone(), at_s });
+                // By its own time, as in host time: a machine with too much else to do is no hanging service.
+                let own = attendant.own_time(&player.role, self.turns, now.since(began));
+                if own > TURN_LIMIT {
+                    return Err(Discord::Silent { role: player.role.clone(), at_s, own_s: own.as_secs() });
                 }
             }
         }

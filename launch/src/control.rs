@@ -1,20 +1,23 @@
 //! How the other commands talk to a running launcher: one JSON line there, one back, over a socket in the board's folder, which belongs to
 //! its owner alone.
 
-use crate::graph::Overrides;
+mod ear;
+
+pub(crate) use ear::Ear;
+
+use crate::graph::{Overrides, ViewSettings};
 use crate::supervise::{Event, Phase, SwapRequest, SwapState};
 use board::host;
 use board::place::{self, Place};
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufRead as _, BufReader, Write as _};
-use std::os::unix::net::{UnixListener, UnixStream};
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
 use std::time::Duration;
 
 const SOCKET: &str = "control.sock";
-/// Nobody may keep the launcher waiting for longer.
-const PATIENCE: Duration = Duration::from_millis(200);
-/// A service's description, with the messages of its topics, takes some.
-const LINE_MAX: u64 = 4 * 1024 * 1024;
+/// For so long a launcher may take to answer a command.
+const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 
 /// What is asked of the launcher.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -34,11 +37,65 @@ pub(crate) enum Request {
         /// The role.
         role: String,
     },
+    /// Change how fast logical time goes.
+    Pace(PaceChange),
     /// Stop the robot, then the services.
     Stop {
         /// Without waiting for anybody.
         fast: bool,
     },
+}
+
+/// What is changed about the pace of logical time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum PaceChange {
+    /// Stand still, or go on.
+    Pause(bool),
+    /// While it stands still: play so much.
+    Step(Duration),
+    /// So many times as fast as now; from as fast as possible it comes down to real time.
+    Times(f64),
+    /// As fast as possible.
+    Fastest,
+}
+
+/// The pace of logical time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Tempo {
+    /// Logical seconds a second; `None` for as fast as possible.
+    pub(crate) speed: Option<f64>,
+    /// Whether it stands still.
+    pub(crate) paused: bool,
+    /// While it stands still: how much is still to be played.
+    pub(crate) step_ns: u64,
+    /// Counts the changes.
+    #[serde(skip)]
+    pub(crate) changes: u32,
+}
+
+impl Tempo {
+    /// Of a run that begins.
+    pub(crate) fn new(speed: Option<f64>) -> Self {
+        Self { speed, paused: false, step_ns: 0, changes: 0 }
+    }
+
+    /// Changes it.
+    pub(crate) fn change(&mut self, change: PaceChange) {
+        self.changes = self.changes.wrapping_add(1);
+        match change {
+            PaceChange::Pause(paused) => (self.paused, self.step_ns) = (paused, 0),
+            PaceChange::Step(length) => {
+                self.paused = true;
+                self.step_ns = u64::try_from(length.as_nanos()).unwrap_or(u64::MAX);
+            }
+            PaceChange::Times(factor) if factor.is_finite() && factor > 0.0 => {
+                self.speed = Some(self.speed.map_or(1.0, |speed| speed * factor).clamp(0.01, 1000.0));
+            }
+            PaceChange::Times(_) => {}
+            PaceChange::Fastest => self.speed = None,
+        }
+    }
 }
 
 /// What the launcher answers.
@@ -54,7 +111,7 @@ pub(crate) enum Answer {
 }
 
 /// How a running graph stands.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Status {
     /// The board.
     pub(crate) board: String,
@@ -68,6 +125,18 @@ pub(crate) struct Status {
     pub(crate) overrides: Overrides,
     /// Where the logs are.
     pub(crate) logs: String,
+    /// `live` or `lockstep`.
+    pub(crate) mode: String,
+    /// The graph's folder, from which the files of the view count.
+    pub(crate) folder: String,
+    /// What a view shows.
+    pub(crate) view: ViewSettings,
+    /// The file into which all messages are recorded.
+    pub(crate) recording: Option<String>,
+    /// In lockstep: how fast logical time goes.
+    pub(crate) tempo: Option<Tempo>,
+    /// In lockstep: the logical moment.
+    pub(crate) logical_s: Option<f64>,
     /// The services, in the order of the graph.
     pub(crate) services: Vec<ServiceStatus>,
     /// What happened lately.
@@ -144,55 +213,73 @@ pub(crate) fn phase_name(phase: Phase) -> &'static str {
     }
 }
 
-/// Opens the launcher's ear.
-///
-/// # Errors
-/// When the socket cannot be made.
-pub(crate) fn listen(place: &Place) -> io::Result<UnixListener> {
-    let listener = UnixListener::bind(place.file(SOCKET))?;
-    listener.set_nonblocking(true)?;
-    Ok(listener)
-}
-
-/// Answers whoever knocks now.
-pub(crate) fn serve(listener: &UnixListener, mut answer: impl FnMut(Request) -> Answer) {
-    while let Ok((stream, _)) = listener.accept() {
-        let _ = converse(&stream, &mut answer);
-    }
-}
-
-fn converse(stream: &UnixStream, answer: &mut impl FnMut(Request) -> Answer) -> io::Result<()> {
-    stream.set_nonblocking(false)?;
-    stream.set_read_timeout(Some(PATIENCE))?;
-    stream.set_write_timeout(Some(PATIENCE))?;
-    let mut line = String::new();
-    let mut reader = BufReader::new(io::Read::take(stream, LINE_MAX));
-    reader.read_line(&mut line)?;
-    let answer = match serde_json::from_str(&line) {
-        Ok(request) => answer(request),
-        Err(error) => Answer::Refused(format!("not a request: {error}")),
-    };
-    let mut stream = stream;
-    writeln!(stream, "{}", serde_json::to_string(&answer)?)
+/// Where a board's launcher listens.
+fn socket(place: &Place) -> PathBuf {
+    place.file(SOCKET)
 }
 
 /// Asks the launcher of a board.
 ///
 /// # Errors
-/// When it does not answer.
+/// When it refuses, or does not answer: with what it is busy with, as far as can be seen.
 pub(crate) fn ask(place: &Place, request: &Request) -> Result<Answer, String> {
-    let no_answer = |error: io::Error| format!("the launcher of `{}` does not answer: {error}", place.name());
-    let mut stream = UnixStream::connect(place.file(SOCKET)).map_err(no_answer)?;
-    stream.set_read_timeout(Some(Duration::from_secs(5))).map_err(no_answer)?;
-    let line = serde_json::to_string(request).map_err(|error| error.to_string())?;
-    writeln!(stream, "{line}").map_err(no_answer)?;
-    let mut line = String::new();
-    BufReader::new(stream).read_line(&mut line).map_err(no_answer)?;
+    ask_within(place, request, ANSWER_WITHIN)
+}
+
+/// As [`ask`], for those who know what to do when there is no answer.
+///
+/// # Errors
+/// As [`ask`].
+pub(crate) fn ask_within(place: &Place, request: &Request, limit: Duration) -> Result<Answer, String> {
+    let line = converse(place, request, limit).map_err(|error| no_answer(place, &error))?;
     match serde_json::from_str(&line) {
         Ok(Answer::Refused(why)) => Err(why),
         Ok(answer) => Ok(answer),
+        Err(_) if line.is_empty() => Err(no_answer(place, &io::ErrorKind::UnexpectedEof.into())),
         Err(error) => Err(format!("the launcher of `{}` answers nonsense: {error}", place.name())),
     }
+}
+
+fn converse(place: &Place, request: &Request, limit: Duration) -> io::Result<String> {
+    use rustix::net::{AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with};
+    // Without blocking: a launcher that stands still has a full waiting room, before which `connect` waits for ever.
+    let flags = SocketFlags::NONBLOCK | SocketFlags::CLOEXEC;
+    let stream = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)?;
+    connect(&stream, &SocketAddrUnix::new(socket(place))?)?;
+    let mut stream = UnixStream::from(stream);
+    stream.set_nonblocking(false)?;
+    stream.set_read_timeout(Some(limit))?;
+    stream.set_write_timeout(Some(limit))?;
+    let line = serde_json::to_string(request)?;
+    writeln!(stream, "{line}")?;
+    let mut line = String::new();
+    BufReader::new(stream).read_line(&mut line)?;
+    Ok(line)
+}
+
+/// Why there is no answer, in words for the operator.
+fn no_answer(place: &Place, error: &io::Error) -> String {
+    let board = place.name();
+    let Some(pid) = host::living_launcher(place) else { return format!("the board `{board}` is down") };
+    if is_suspended(pid) {
+        return format!(
+            "the launcher of `{board}` (process {pid}) is suspended; `kill -CONT {pid}` lets it go on, `launch stop` ends the robot"
+        );
+    }
+    let why = match error.kind() {
+        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => "it has not said a word in time".to_owned(),
+        io::ErrorKind::UnexpectedEof => "it hung up".to_owned(),
+        io::ErrorKind::NotFound => "it has just come up, or is going down".to_owned(),
+        _ => error.to_string(),
+    };
+    format!("the launcher of `{board}` (process {pid}) does not answer: {why}")
+}
+
+/// Whether a process was stopped by a signal or by a debugger.
+pub(crate) fn is_suspended(pid: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    let state = stat.rsplit(')').next().and_then(|rest| rest.trim_start().chars().next());
+    matches!(state, Some('T' | 't'))
 }
 
 /// The boards that are up.

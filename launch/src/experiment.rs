@@ -14,8 +14,9 @@ mod store;
 mod tests;
 
 use crate::cli::ExperimentArgs;
+use crate::console::{say, say_line, warn};
 use crate::graph::{self, Checked, Request};
-use crate::up::Signals;
+use crate::signals::Signals;
 use board::clock;
 use crew::{Crew, Job};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -33,7 +34,7 @@ pub(crate) fn command(args: &ExperimentArgs) -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
-            eprintln!("error: {error}");
+            warn(&format!("error: {error}"));
             ExitCode::FAILURE
         }
     }
@@ -56,10 +57,10 @@ fn conduct(args: &ExperimentArgs) -> Result<bool, Box<dyn std::error::Error>> {
     };
     let (mut store, outdated) = Store::open(&out.join("runs.csv"), &plan.axes, is_wanted)?;
     if outdated > 0 {
-        eprintln!(
+        warn(&format!(
             "{outdated} runs are done again: they failed to run, or something in them has changed since (kept in {})",
             out.join("runs-outdated.csv").display()
-        );
+        ));
     }
     let known: Vec<String> = store.records.iter().map(|record| record.key.clone()).collect();
     let job = |(key, run): (&String, &plan::Run)| Job {
@@ -86,7 +87,7 @@ fn conduct(args: &ExperimentArgs) -> Result<bool, Box<dyn std::error::Error>> {
 
     let records = &store.records;
     if records.is_empty() {
-        eprintln!("no run was finished");
+        warn("no run was finished");
         return Ok(false);
     }
     let complete = records.len() == plan.runs.len();
@@ -95,11 +96,15 @@ fn conduct(args: &ExperimentArgs) -> Result<bool, Box<dyn std::error::Error>> {
     for figure in report::telling_figures(records) {
         plot::draw(&out.join("plots").join(plot::file_name(&figure)), &figure, &groups)?;
     }
-    print!("{}", report::tables(&plan, records, false));
-    println!("{}", computation(records));
-    println!("runs.csv, table.md and plots of these runs: {}", out.display());
+    say(&report::tables(&plan, records, false));
+    say_line(&computation(records));
+    say_line(&format!("runs.csv, table.md and plots of these runs: {}", out.display()));
     if !complete {
-        println!("{} of {} runs are done; the same command does the rest", records.len(), plan.runs.len());
+        say_line(&format!(
+            "{} of {} runs are done; the same command does the rest",
+            records.len(),
+            plan.runs.len()
+        ));
     }
     let holds = report::verdicts(&plan, &groups).iter().all(report::Verdict::holds);
     let errors = records.iter().any(|record| record.outcome == Outcome::Error);
@@ -135,7 +140,7 @@ fn checked_keys(plan: &Plan, build: bool) -> Option<Vec<String>> {
         seen.push((run.variant, &run.situation));
         let request = Request { graph: plan.graph.clone(), overrides: run.overrides.clone(), build };
         let Some(checked) = graph::prepare(&request) else {
-            eprintln!("so `{}` is refused, and no run was begun", plan.variants[run.variant].name);
+            warn(&format!("so `{}` is refused, and no run was begun", plan.variants[run.variant].name));
             return None;
         };
         prints.entry(run.variant).or_insert_with(|| fingerprint(&checked, &mut hashes));
@@ -193,10 +198,10 @@ fn processors(jobs: Option<usize>) -> Vec<usize> {
 }
 
 fn print_plan(plan: &Plan, places: usize) {
-    println!("{}: {} runs of {}, {places} at once", plan.name, plan.runs.len(), plan.graph);
+    say_line(&format!("{}: {} runs of {}, {places} at once", plan.name, plan.runs.len(), plan.graph));
     for (index, variant) in plan.variants.iter().enumerate() {
         let runs = plan.runs.iter().filter(|run| run.variant == index).count();
-        println!("  {runs:>5} x {}", variant.name);
+        say_line(&format!("  {runs:>5} x {}", variant.name));
     }
 }
 
@@ -237,7 +242,7 @@ impl Progress {
             bar.set_position(done as u64);
             bar.reset_eta();
         } else if done > 0 {
-            eprintln!("{done} of {total} runs are done already");
+            warn(&format!("{done} of {total} runs are done already"));
         }
         Self { bar, total, done, passed, began: clock::monotonic() }
     }
@@ -253,7 +258,7 @@ impl Progress {
             }
             None if self.done.is_multiple_of(self.total.div_ceil(20)) || self.done == self.total => {
                 let took_s = clock::monotonic().seconds_since(self.began);
-                eprintln!("[{took_s:>8.1}] {} of {} runs, {message}", self.done, self.total);
+                warn(&format!("[{took_s:>8.1}] {} of {} runs, {message}", self.done, self.total));
             }
             None => {}
         }

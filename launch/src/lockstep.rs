@@ -1,12 +1,16 @@
 //! `launch up --lockstep`: the same processes in logical time.
 
+use crate::console::Console;
+use crate::desk::{Desk, Face};
 use crate::graph::{Checked, Fault};
 use crate::observer::Observer;
 use crate::play::Stage;
 use crate::prompter::{Part, Prompter};
+use crate::runs::{self, Ended, Record};
+use crate::signals::Signals;
 use crate::summary;
 use crate::supervise::Supervisor;
-use crate::up::{Display, Options, Signals};
+use crate::up::{self, Options};
 use board::clock;
 use board::tap::Tap;
 use messages::{RunState, RunSummary, Time};
@@ -68,6 +72,8 @@ pub(crate) struct Outcome {
     /// Faults that were ordered while it ran.
     pub(crate) ordered: Vec<Fault>,
     pub(crate) interrupted: bool,
+    /// What services could not leave in order at the end.
+    pub(crate) unclean: Vec<String>,
 }
 
 /// Runs a graph in logical time until its referee, the limit or a person ends it.
@@ -79,7 +85,8 @@ pub(crate) fn run(
     options: &Options,
     pace: &Pace,
     signals: &Signals,
-    display: &mut dyn Display,
+    console: &Console,
+    face: Face,
 ) -> Result<Outcome, Failure> {
     let board = options.board.as_deref().unwrap_or(&graph.name);
     let mut graph = graph.clone();
@@ -90,25 +97,41 @@ pub(crate) fn run(
     }
     let mut set = rustix::thread::CpuSet::new();
     set.set(cpu);
-    rustix::thread::sched_setaffinity(None, &set)?;
     let script = pace.script.as_ref().map(|script| Recording::open(&script.file)).transpose()?;
     let mut supervisor = Supervisor::new(&graph, board, options.logs.as_deref(), true)?;
-    let observer = Tap::join(supervisor.host.place().clone(), "observer")
-        .map_err(Into::into)
-        .and_then(|tap| Observer::new(tap, &graph, pace));
+    let mut desk = Desk::new(&graph, console.clone(), signals, face);
+    // What speaks to people has a processor of its own where there is one.
+    let opened = desk.open(supervisor.host.place());
+    let pinned = rustix::thread::sched_setaffinity(None, &set);
+    let observer = opened
+        .map_err(Failure::from)
+        .and_then(|()| pinned.map_err(|error| format!("--cpu {cpu}: {error}").into()))
+        .and_then(|()| Tap::join(supervisor.host.place().clone(), "observer").map_err(Into::into))
+        .and_then(|tap| Observer::new(tap, &graph, pace).map_err(Into::into));
     let mut observer = match observer {
         Ok(observer) => observer,
         Err(error) => {
             supervisor.stop(&|| true)?;
-            return Err(error.into());
+            return Err(error);
         }
     };
+    let mut record = Record::begin(board, &graph.file, graph.seed, true);
+    up::keep(&mut supervisor, &record);
     supervisor.start_all();
     let outcome = wait_until_ready(&mut supervisor, signals)
         .and_then(|()| prompter(&supervisor, script.as_ref(), pace))
-        .and_then(|prompter| Stage::new(&graph, &mut supervisor, &mut observer, prompter, pace))
-        .and_then(|mut stage| stage.play(pace, signals, display));
-    display.close();
+        .and_then(|prompter| Stage::new(&graph, &mut supervisor, &mut observer, prompter, pace, desk))
+        .and_then(|mut stage| {
+            let played = stage.play(pace);
+            stage.close();
+            played
+        });
+    let ended = match &outcome {
+        Ok(outcome) => outcome.ended(signals),
+        Err(error) => error.to_string(),
+    };
+    supervisor.note("", ended.clone(), outcome.is_err());
+    let mut failures = Vec::new();
     if let Err(error) = &outcome {
         let role = supervisor
             .services
@@ -116,15 +139,51 @@ pub(crate) fn run(
             .find(|service| error.to_string().contains(&format!("`{}`", service.service.role)));
         if let Some(service) = role {
             let role = service.service.role.clone();
-            eprintln!("the last lines of the log of `{role}`:");
-            supervisor.last_log_lines(&role, 12).iter().for_each(|line| eprintln!("  {line}"));
+            let lines = supervisor.telling_lines(&role, 12);
+            if !lines.is_empty() {
+                console.error(&format!("the last lines of the log of `{role}`:"));
+                lines.iter().for_each(|line| console.error(&format!("  {line}")));
+            }
         }
     }
     let recorded = observer.finish(outcome.as_ref().ok());
     drop(observer);
-    supervisor.stop(&|| signals.count() > 1)?;
+    let folder = supervisor.logs().clone();
+    failures.extend(supervisor.stop(&|| signals.count() > 1)?);
     recorded?;
+    let mut outcome = outcome;
+    if let Ok(outcome) = &mut outcome {
+        outcome.unclean = failures;
+    }
+    let passed = outcome.as_ref().is_ok_and(Outcome::is_success);
+    record.end = Some(Ended {
+        at_unix_s: runs::unix_s(),
+        why: ended,
+        code: u8::from(!passed),
+        summary: outcome.as_ref().map(as_text).unwrap_or_default(),
+        run: outcome.as_ref().map(as_value).unwrap_or_default(),
+    });
+    if let Err(error) = folder.write(&record) {
+        console.error(&format!("the end of this run is not kept in {}: {error}", folder.path().display()));
+    }
     outcome
+}
+
+impl Outcome {
+    /// Whether nothing went wrong: a run that was broken off has not failed.
+    pub(crate) fn is_success(&self) -> bool {
+        self.verdict != Some(RunState::Failed) && self.unclean.is_empty()
+    }
+
+    /// Who or what ended it.
+    fn ended(&self, signals: &Signals) -> String {
+        match self.verdict {
+            Some(RunState::Passed) => "the judge has ended the run: passed".to_owned(),
+            Some(_) => "the judge has ended the run: failed".to_owned(),
+            None if self.interrupted => signals.why().to_owned(),
+            None => "the run is over: its time, or all that was to happen".to_owned(),
+        }
+    }
 }
 
 fn prompter<'a>(
@@ -154,26 +213,41 @@ fn wait_until_ready(supervisor: &mut Supervisor, signals: &Signals) -> Result<()
 }
 
 /// `launch up --lockstep`, with its last lines.
-pub(crate) fn up(graph: &Checked, options: &Options, pace: &Pace, display: &mut dyn Display) -> ExitCode {
-    let run = || -> Result<Outcome, Failure> {
-        for swept in board::host::sweep_named(options.board.as_deref())? {
-            eprintln!("{}", summary::swept(&swept));
-        }
-        let signals = Signals::catch()?;
-        run(graph, options, pace, &signals, display)
-    };
-    let mut run = run;
-    match run() {
+pub(crate) fn up(graph: &Checked, options: &Options, pace: &Pace, face: Face) -> ExitCode {
+    let console = Console::start();
+    let code = match run_to_the_end(graph, options, pace, face, &console) {
         Ok(outcome) => {
-            print!("{}", if options.json { as_json(&outcome) } else { as_text(&outcome) });
-            let failed = outcome.verdict == Some(RunState::Failed);
-            if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS }
+            console.release();
+            console.print(&if options.json {
+                format!("{}\n", as_value(&outcome))
+            } else {
+                as_text(&outcome)
+            });
+            outcome.unclean.iter().for_each(|failure| console.error(&format!("error: {failure}")));
+            if outcome.is_success() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
         }
         Err(error) => {
-            eprintln!("error: {error}");
+            console.release();
+            console.error(&format!("error: {error}"));
             ExitCode::FAILURE
         }
+    };
+    console.flush();
+    code
+}
+
+fn run_to_the_end(
+    graph: &Checked,
+    options: &Options,
+    pace: &Pace,
+    face: Face,
+    console: &Console,
+) -> Result<Outcome, Failure> {
+    for swept in board::host::sweep_named(options.board.as_deref())? {
+        console.error(&summary::swept(&swept));
     }
+    let signals = Signals::catch()?;
+    run(graph, options, pace, &signals, console, face)
 }
 
 fn as_text(outcome: &Outcome) -> String {
@@ -190,22 +264,17 @@ fn as_text(outcome: &Outcome) -> String {
     )
 }
 
-fn as_json(outcome: &Outcome) -> String {
-    let run = outcome
-        .summary
-        .as_ref()
-        .map(|word| summary::json(word, outcome.restarts))
-        .unwrap_or_else(|| "null".to_owned());
-    let run: serde_json::Value = serde_json::from_str(&run).unwrap_or_default();
-    let value = serde_json::json!({
+fn as_value(outcome: &Outcome) -> serde_json::Value {
+    let run = outcome.summary.as_ref().map(|word| summary::value(word, outcome.restarts));
+    serde_json::json!({
         "run": run,
         "logical_s": outcome.end.as_secs_f64(),
         "wall_s": outcome.wall_s,
         "turns": outcome.turns,
         "digest": outcome.digest,
         "interrupted": outcome.interrupted,
-    });
-    format!("{value}\n")
+        "unclean": outcome.unclean,
+    })
 }
 
 fn last_processor() -> usize {

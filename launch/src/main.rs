@@ -5,22 +5,29 @@ mod cli;
 mod commands;
 mod compare;
 mod conductor;
+mod console;
 mod control;
+mod desk;
 mod detach;
 mod experiment;
 mod faults;
 mod graph;
+mod journal;
 mod lockstep;
 mod monitor;
 mod new;
 mod notes;
 mod observer;
+mod order;
 mod plain;
 mod play;
 mod prompter;
 mod record;
 mod rerun;
+mod runs;
 mod shadow;
+mod signals;
+mod standstill;
 mod steering;
 mod summary;
 mod supervise;
@@ -30,7 +37,7 @@ mod view;
 
 use clap::Parser as _;
 use cli::{Cli, Command, UpArgs};
-use std::io::IsTerminal as _;
+use desk::Face;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -38,7 +45,8 @@ fn main() -> ExitCode {
         Command::Check(args) => graph::check_command(&args.which.request(None), args.json),
         Command::Up(args) => up_command(&args),
         Command::Ps(args) => commands::finish(commands::ps(&args)),
-        Command::Top(args) => commands::finish(commands::top(&args)),
+        Command::Attach(args) => commands::finish(commands::attach(&args)),
+        Command::Last(args) => commands::finish(commands::last(&args)),
         Command::Logs(args) => commands::finish(commands::logs(&args)),
         Command::Restart(args) => commands::finish(commands::restart(&args)),
         Command::Swap(args) => commands::finish(swap::command(&args)),
@@ -59,9 +67,14 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Command::CleanDead { board } => {
-            // What cannot be cleaned now is cleaned when the board is taken down.
-            let _ = board::host::clean_dead(&board);
-            ExitCode::SUCCESS
+            // What cannot be cleaned now is cleaned when the board is taken down; only a board that cannot be is an error.
+            match board::place::Place::new(&board) {
+                Ok(_) => {
+                    let _ = board::host::clean_dead(&board);
+                    ExitCode::SUCCESS
+                }
+                Err(error) => commands::finish(Err(error.to_string())),
+            }
         }
     }
 }
@@ -78,8 +91,13 @@ fn up_command(args: &UpArgs) -> ExitCode {
         logs: args.log_dir.clone(),
         record: args.record.clone(),
         json: args.json,
+        stay: args.stay,
     };
-    let mut lines = plain::Lines::new(args.no_view);
+    let face = match (args.no_view, args.plain) {
+        (true, _) => Face::Trouble,
+        (false, true) => Face::Lines,
+        (false, false) => face(),
+    };
     if args.lockstep {
         let pace = lockstep::Pace {
             speed: args.speed,
@@ -89,14 +107,16 @@ fn up_command(args: &UpArgs) -> ExitCode {
             steered: args.steered,
             ..lockstep::Pace::default()
         };
-        return lockstep::up(&graph, &options, &pace, &mut lines);
+        return lockstep::up(&graph, &options, &pace, face);
     }
-    if !graph.faults.is_empty() {
-        eprintln!("the faults of the graph happen in logical time only: with --lockstep");
+    up::say_what_is_unwise(&graph);
+    up::up(&graph, &options, face)
+}
+
+/// The whole terminal where it can show a picture, lines elsewhere.
+fn face() -> Face {
+    if let Some(why) = view::why_not() {
+        console::warn(why);
     }
-    let on_terminal = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
-    if on_terminal && !args.plain && !args.no_view {
-        return up::up(&graph, &options, &mut view::Live::new(&graph));
-    }
-    up::up(&graph, &options, &mut lines)
+    if view::can_show() { Face::View } else { Face::Lines }
 }

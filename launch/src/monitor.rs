@@ -1,13 +1,15 @@
 //! What the launcher sees of the running services: their health, their use of the machine, and the referee's word.
 
-use crate::control::{self, ServiceStatus, Status};
+use crate::control::{self, ServiceStatus, Status, Tempo};
+use crate::graph::Checked;
+use crate::record::Recording;
+use crate::standstill::Standstill;
 use crate::supervise::Supervisor;
 use board::host::health_topic;
 use board::tap::{Tap, TapReader};
 use board::{JoinError, clock};
 use messages::{Health, Message, RunSummary, Time, View};
 use std::collections::HashMap;
-use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -15,12 +17,14 @@ const SAMPLE_PERIOD: Duration = Duration::from_secs(1);
 
 /// Looks at the board and at the processes.
 pub(crate) struct Monitor {
-    pub(crate) tap: Tap,
+    /// Holds the place on the board.
+    _tap: Tap,
     health: HashMap<String, (TapReader, Health)>,
     finish: Option<TapReader>,
     samples: HashMap<String, Sample>,
     sampled: Option<Time>,
     summary: Option<RunSummary>,
+    standstill: Standstill,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -47,7 +51,9 @@ impl Monitor {
             health.insert(role, (reader, Health::default()));
         }
         let finish = finish.map(|topic| tap.reader(topic)).transpose()?;
-        Ok(Self { tap, health, finish, samples: HashMap::new(), sampled: None, summary: None })
+        let standstill = Standstill::new(&tap);
+        let samples = HashMap::new();
+        Ok(Self { _tap: tap, health, finish, samples, sampled: None, summary: None, standstill })
     }
 
     /// Takes in what came since the last look.
@@ -64,6 +70,11 @@ impl Monitor {
         if self.sampled.is_none_or(|last| now.since(last) >= SAMPLE_PERIOD) {
             self.sample(supervisor, now);
         }
+    }
+
+    /// What keeps the wheels from turning, when it lasts or is over: an event, and whether it is trouble.
+    pub(crate) fn standstill(&mut self, now: Time) -> Option<(String, bool)> {
+        self.standstill.look(now)
     }
 
     /// The referee's last word.
@@ -90,7 +101,13 @@ impl Monitor {
     }
 
     /// How everything stands.
-    pub(crate) fn status(&self, supervisor: &Supervisor, graph: &Path) -> Status {
+    pub(crate) fn status(
+        &self,
+        supervisor: &Supervisor,
+        graph: &Checked,
+        recording: Option<&Recording>,
+        tempo: Option<Tempo>,
+    ) -> Status {
         let services = supervisor.services.iter().map(|service| {
             let role = &service.service.role;
             let health = self.health.get(role).map(|(_, health)| *health).unwrap_or_default();
@@ -113,17 +130,23 @@ impl Monitor {
                 swap: service.swap_state().cloned(),
             }
         });
+        let is_lockstep = supervisor.host.is_lockstep();
         Status {
             board: supervisor.host.place().name().to_owned(),
-            graph: std::path::absolute(graph).unwrap_or_else(|_| graph.to_owned()).display().to_string(),
+            graph: std::path::absolute(&graph.file)
+                .unwrap_or_else(|_| graph.file.clone())
+                .display()
+                .to_string(),
             launcher_pid: std::process::id(),
             uptime_s: clock::monotonic().seconds_since(supervisor.began),
             overrides: supervisor.overrides.clone(),
-            logs: supervisor
-                .log_file("x")
-                .parent()
-                .map(|path| path.display().to_string())
-                .unwrap_or_default(),
+            logs: supervisor.logs().path().display().to_string(),
+            mode: if is_lockstep { "lockstep" } else { "live" }.to_owned(),
+            folder: graph.folder.display().to_string(),
+            view: graph.view.clone(),
+            recording: recording.map(|recording| recording.file().display().to_string()),
+            tempo,
+            logical_s: is_lockstep.then(|| board::tap::now(supervisor.host.switchboard()).as_secs_f64()),
             services: services.collect(),
             events: supervisor.events.iter().map(Into::into).collect(),
         }

@@ -1,6 +1,7 @@
 //! `launch new`: a complete small service to begin with, in this workspace or in a repository of its own.
 
 use crate::cli::NewArgs;
+use crate::console::say;
 use crate::graph::checkout;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -53,7 +54,7 @@ pub(crate) fn command(args: &NewArgs) -> Result<(), String> {
     }
     // How lines break depends on the name's length. Without rustfmt they stay as they are.
     let _ = Command::new("cargo").arg("fmt").current_dir(&folder).stderr(Stdio::null()).status();
-    print!("{}", next_steps(name, &folder, inside));
+    say(&next_steps(name, &folder, inside));
     Ok(())
 }
 

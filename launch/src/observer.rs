@@ -38,6 +38,12 @@ pub(crate) enum ObserverError {
     /// The recording.
     #[error(transparent)]
     Recording(#[from] recording::RecordingError),
+    /// The recording, a while ago.
+    #[error("{} was broken off", file.display())]
+    BrokenOff {
+        /// The file.
+        file: std::path::PathBuf,
+    },
 }
 
 impl Observer {

@@ -1,6 +1,8 @@
 //! The loop of a run in logical time: instant after instant, with what was planned between them.
 
-use crate::conductor::{Conductor, Discord};
+use crate::conductor::{Attendant, Conductor, Discord};
+use crate::control::Tempo;
+use crate::desk::Desk;
 use crate::faults::Faults;
 use crate::graph::Checked;
 use crate::lockstep::{Outcome, Pace};
@@ -8,14 +10,16 @@ use crate::monitor::Monitor;
 use crate::observer::Observer;
 use crate::prompter::Prompter;
 use crate::steering::{Order, Steering};
-use crate::supervise::{Phase, Supervisor};
-use crate::up::{Display, Signals};
+use crate::supervise::{Phase, Pulse, Supervised, Supervisor, vitals};
 use board::{clock, gate};
 use messages::Time;
+use std::collections::HashMap;
 use std::time::Duration;
 
 /// Between two looks at signals, deaths and the screen.
 const GLANCE: Duration = Duration::from_millis(20);
+/// A turn of this length is spoken of.
+const LONG_TURN: Duration = Duration::from_secs(5);
 const NEVER: Time = Time::from_nanos(u64::MAX);
 
 type Failure = Box<dyn std::error::Error>;
@@ -29,8 +33,59 @@ pub(crate) struct Stage<'a> {
     conductor: Conductor,
     faults: Faults,
     steering: Option<Steering>,
+    desk: Desk<'a>,
+    tempo: Option<Tempo>,
+    /// The moment in both times from which the pace counts, and the change of it that began there.
+    paced_from: (Time, Time, u32),
+    /// While it stands still: the moment up to which it is still to go.
+    step_to: Option<Time>,
     began: Time,
     next_glance: Time,
+    turn: LongTurn,
+}
+
+/// A turn that takes long.
+#[derive(Debug, Default)]
+struct LongTurn {
+    number: u64,
+    pulses: HashMap<String, Pulse>,
+    is_said: bool,
+}
+
+/// What the conductor asks while somebody is in its turn.
+struct Watch<'a, 'b> {
+    services: &'a [Supervised],
+    desk: &'a Desk<'b>,
+    now: Time,
+    turn: &'a mut LongTurn,
+}
+
+impl Attendant for Watch<'_, '_> {
+    fn lives(&mut self, role: &str) -> bool {
+        let service = self.services.iter().find(|service| service.service.role == role);
+        service.and_then(Supervised::pid).is_some_and(board::switchboard::process_lives)
+    }
+
+    fn wants_to_end(&mut self) -> bool {
+        self.desk.signals.count() > 0
+    }
+
+    fn own_time(&mut self, role: &str, turn: u64, waited: Duration) -> Duration {
+        if self.turn.number != turn {
+            *self.turn = LongTurn { number: turn, ..LongTurn::default() };
+        }
+        if waited > LONG_TURN && !std::mem::replace(&mut self.turn.is_said, true) {
+            let (at_s, waited_s) = (self.now.as_secs_f64(), waited.as_secs());
+            self.desk.console.error(&format!(
+                "`{role}` has been in one turn for {waited_s} s (after {at_s:.3} s of logical time); Ctrl-C ends the run"
+            ));
+        }
+        let pid = self.services.iter().find(|service| service.service.role == role).and_then(Supervised::pid);
+        let Some(pid) = pid else { return waited };
+        let pulse = self.turn.pulses.entry(role.to_owned()).or_default();
+        // No heartbeat is expected within a turn.
+        pulse.look(clock::monotonic(), 0, || vitals(pid)).own
+    }
 }
 
 /// What comes next.
@@ -64,6 +119,7 @@ impl<'a> Stage<'a> {
         observer: &'a mut Observer,
         prompter: Prompter<'a>,
         pace: &Pace,
+        desk: Desk<'a>,
     ) -> Result<Self, Failure> {
         let players = supervisor.services.iter().filter_map(|service| {
             let compute = service.service.launch.compute.unwrap_or_default();
@@ -81,8 +137,13 @@ impl<'a> Stage<'a> {
             conductor,
             faults: Faults::new(graph.faults.iter().chain(&pace.faults)),
             steering: pace.steered.then(Steering::new),
+            desk,
+            tempo: Some(Tempo::new(pace.speed)),
+            paced_from: (began, pace.begin, 0),
+            step_to: None,
             began,
             next_glance: began.after(GLANCE),
+            turn: LongTurn::default(),
         })
     }
 
@@ -90,22 +151,20 @@ impl<'a> Stage<'a> {
     ///
     /// # Errors
     /// When a service dies unplanned, or anything else makes the run worthless.
-    pub(crate) fn play(
-        &mut self,
-        pace: &Pace,
-        signals: &Signals,
-        display: &mut dyn Display,
-    ) -> Result<Outcome, Failure> {
+    pub(crate) fn play(&mut self, pace: &Pace) -> Result<Outcome, Failure> {
         let limit = pace.until.unwrap_or(NEVER);
         let mut interrupted = false;
         while self.observer.verdict().is_none() && self.conductor.now() < limit {
             let now = clock::monotonic();
             if now >= self.next_glance {
-                self.glance(now, display)?;
-                if signals.count() > 0 || display.wants_to_leave() {
+                self.glance(now)?;
+                if self.desk.signals.count() > 0 {
                     interrupted = true;
                     break;
                 }
+            }
+            if self.stands_still(now) {
+                continue;
             }
             let next = self.next()?;
             if pace.last.is_some_and(|last| next.at() > last) {
@@ -114,13 +173,18 @@ impl<'a> Stage<'a> {
             if let Some(steering) = &self.steering
                 && next.at() > steering.target()
             {
-                if !self.rest(signals)? {
+                if !self.rest()? {
                     break;
                 }
                 continue;
             }
             match next {
-                Next::Instant(at) => self.play_instant(at)?,
+                Next::Instant(at) => {
+                    if !self.play_instant(at)? {
+                        interrupted = true;
+                        break;
+                    }
+                }
                 Next::Fault(_) => {
                     self.faults.perform_next(self.supervisor, &mut self.conductor, &self.prompter)?;
                 }
@@ -132,9 +196,6 @@ impl<'a> Stage<'a> {
                 }
             }
             gate::let_in(self.supervisor.host.switchboard());
-            if let Some(speed) = pace.speed {
-                self.keep_pace(speed);
-            }
         }
         // What came from outside after the last instant belongs to the run.
         let end = pace.last.unwrap_or(self.conductor.now()).max(self.conductor.now());
@@ -166,7 +227,8 @@ impl<'a> Stage<'a> {
         })
     }
 
-    fn play_instant(&mut self, at: Time) -> Result<(), Failure> {
+    /// False when the end was asked for while a service was in its turn.
+    fn play_instant(&mut self, at: Time) -> Result<bool, Failure> {
         let mut seen = Ok(());
         let observer = &mut *self.observer;
         let mut look = |_, _| {
@@ -174,25 +236,70 @@ impl<'a> Stage<'a> {
                 seen = observer.look();
             }
         };
-        let services = &self.supervisor.services;
-        let mut lives = |role: &str| {
-            let service = services.iter().find(|service| service.service.role == role);
-            service.and_then(|service| service.pid()).is_some_and(board::switchboard::process_lives)
-        };
         let host = &self.supervisor.host;
-        let played = self.conductor.play_instant(host, at, &mut self.prompter, &mut look, &mut lives);
+        let mut watch = Watch {
+            services: &self.supervisor.services,
+            desk: &self.desk,
+            now: self.conductor.now(),
+            turn: &mut self.turn,
+        };
+        let played = self.conductor.play_instant(host, at, &mut self.prompter, &mut look, &mut watch);
         seen?;
-        Ok(played?)
+        match played {
+            Err(Discord::Interrupted) => Ok(false),
+            played => Ok(played.map(|()| true)?),
+        }
     }
 
-    /// Looks at processes and the screen: between many instants, since it costs as much as one.
-    fn glance(&mut self, now: Time, display: &mut dyn Display) -> Result<(), Failure> {
+    /// Looks at processes, at who asks, and says how everything stands: between many instants, since it costs as much as one.
+    fn glance(&mut self, now: Time) -> Result<(), Failure> {
         self.next_glance = now.after(GLANCE);
         self.observer.tick(now)?;
         self.supervisor.tick();
         self.monitor.update(self.supervisor);
-        display.show(self.supervisor, &mut self.monitor);
+        self.desk.serve(now, self.supervisor, &self.monitor, None, &mut self.tempo);
+        if let Some(why) = self.supervisor.lost() {
+            return Err(why.into());
+        }
         self.refuse_deaths()
+    }
+
+    /// The end has come: nobody is shown or told anything any more.
+    pub(crate) fn close(&mut self) {
+        self.desk.close(self.supervisor, &self.monitor, self.tempo);
+    }
+
+    /// Whether logical time is to stand still at present, because of its pace or a pause; then a moment of the world's time is over.
+    fn stands_still(&mut self, now: Time) -> bool {
+        let is_paused = self.is_paused();
+        let rest = if is_paused { Some(GLANCE) } else { self.ahead(now) };
+        let Some(rest) = rest else { return false };
+        // Who wants to say something from outside may, as at any rest.
+        let board = self.supervisor.host.switchboard();
+        gate::open(board);
+        clock::sleep(rest.min(GLANCE));
+        gate::close(board);
+        true
+    }
+
+    /// Whether a person has stopped logical time, and no step is left to be played.
+    fn is_paused(&mut self) -> bool {
+        let Some(tempo) = self.tempo.as_mut().filter(|tempo| tempo.paused) else {
+            self.step_to = None;
+            return false;
+        };
+        let now = self.conductor.now();
+        if tempo.step_ns > 0 {
+            let from = self.step_to.unwrap_or(now);
+            self.step_to = Some(from.after(Duration::from_nanos(std::mem::take(&mut tempo.step_ns))));
+        }
+        if self.step_to.is_some_and(|to| now < to) {
+            return false;
+        }
+        self.step_to = None;
+        // The pace counts from where it goes on.
+        tempo.changes = tempo.changes.wrapping_add(1);
+        true
     }
 
     /// A death that nobody planned makes the run another one each time.
@@ -208,8 +315,9 @@ impl<'a> Stage<'a> {
     }
 
     /// Rests at the moment that was asked for until more is; false when the run is to end.
-    fn rest(&mut self, signals: &Signals) -> Result<bool, Failure> {
+    fn rest(&mut self) -> Result<bool, Failure> {
         let Some(steering) = &mut self.steering else { return Ok(true) };
+        let signals = self.desk.signals;
         let board = self.supervisor.host.switchboard();
         self.conductor.rest_at(&self.supervisor.host, steering.target());
         gate::open(board);
@@ -241,11 +349,16 @@ impl<'a> Stage<'a> {
         finished || pace.script.is_some()
     }
 
-    fn keep_pace(&self, speed: f64) {
-        let ahead = self.conductor.now().as_secs_f64() / speed - clock::monotonic().seconds_since(self.began);
-        if ahead > 0.0 {
-            clock::sleep(Duration::from_secs_f64(ahead.min(0.02)));
+    /// How far logical time is ahead of the pace that was asked for.
+    fn ahead(&mut self, now: Time) -> Option<Duration> {
+        let Some(Tempo { speed: Some(speed), changes, .. }) = self.tempo else { return None };
+        let logical = self.conductor.now();
+        if self.paced_from.2 != changes {
+            self.paced_from = (now, logical, changes);
         }
+        let (from, logical_from, _) = self.paced_from;
+        let ahead_s = logical.seconds_since(logical_from) / speed - now.seconds_since(from);
+        (ahead_s > 0.0).then(|| Duration::from_secs_f64(ahead_s.min(1.0)))
     }
 
     fn outcome(&self, interrupted: bool) -> Outcome {
@@ -259,6 +372,7 @@ impl<'a> Stage<'a> {
             ordered: self.faults.ordered.clone(),
             restarts: self.supervisor.services.iter().map(|service| service.restarts).sum(),
             interrupted,
+            unclean: Vec::new(),
         }
     }
 }

@@ -18,8 +18,9 @@ const LOOK: Duration = Duration::from_millis(50);
 /// A recording that goes on until it is ended.
 #[derive(Debug)]
 pub(crate) struct Recording {
+    file: PathBuf,
     ending: Arc<AtomicBool>,
-    thread: JoinHandle<Result<(), ObserverError>>,
+    thread: Option<JoinHandle<Result<(), ObserverError>>>,
 }
 
 impl Recording {
@@ -33,21 +34,42 @@ impl Recording {
             return Err(std::io::Error::new(std::io::ErrorKind::AlreadyExists, words));
         }
         let ending = Arc::new(AtomicBool::new(false));
-        let (place, graph, file) = (place.clone(), graph.clone(), file.to_owned());
+        let (place, graph, path) = (place.clone(), graph.clone(), file.to_owned());
+        let file = path.clone();
         let end = Arc::clone(&ending);
         let thread = std::thread::Builder::new()
             .name("record".to_owned())
             .spawn(move || record(place, &graph, file, &end))?;
-        Ok(Self { ending, thread })
+        Ok(Self { file: path, ending, thread: Some(thread) })
+    }
+
+    /// Where it goes.
+    pub(crate) fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// What keeps it from going on; said once, at once.
+    pub(crate) fn trouble(&mut self) -> Option<String> {
+        self.thread.as_ref().filter(|thread| thread.is_finished())?;
+        let ended = self.thread.take()?.join();
+        Some(match ended {
+            Ok(Ok(())) => "it has ended".to_owned(),
+            Ok(Err(error)) => error.to_string(),
+            Err(_) => "its thread has panicked".to_owned(),
+        })
     }
 
     /// Ends it.
     ///
     /// # Errors
     /// When it could not be written.
-    pub(crate) fn end(self) -> Result<(), ObserverError> {
+    pub(crate) fn end(mut self) -> Result<(), ObserverError> {
         self.ending.store(true, Ordering::Release);
-        self.thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        match self.thread.take() {
+            Some(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+            // It was said when it happened; the run has failed all the same.
+            None => Err(ObserverError::BrokenOff { file: self.file }),
+        }
     }
 }
 

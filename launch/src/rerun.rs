@@ -1,12 +1,15 @@
 //! `launch rerun`: a recorded run again, whole or service by service on the recorded inputs, and whether it comes out the same.
 
 use crate::cli::RerunArgs;
+use crate::console::Console;
+use crate::console::{say, say_line, warn};
+use crate::desk::Face;
 use crate::graph::{self, Checked, Overrides, Publisher, Request};
 use crate::lockstep::{self, Outcome, Pace, Script};
 use crate::notes;
-use crate::plain::Lines;
 use crate::prompter::Part;
-use crate::up::{Options, Signals};
+use crate::signals::Signals;
+use crate::up::Options;
 use messages::Time;
 use recording::{Difference, Digest, Recording, TopicComparison, compare_topics};
 use serde::Serialize;
@@ -51,9 +54,9 @@ pub(crate) fn command(args: &RerunArgs) -> ExitCode {
     match rerun(args) {
         Ok(report) => {
             if args.json {
-                println!("{}", serde_json::to_string_pretty(&report).unwrap_or_default());
+                say_line(&serde_json::to_string_pretty(&report).unwrap_or_default());
             } else {
-                print!("{}", text(&report));
+                say(&text(&report));
             }
             if report.same { ExitCode::SUCCESS } else { ExitCode::FAILURE }
         }
@@ -61,7 +64,7 @@ pub(crate) fn command(args: &RerunArgs) -> ExitCode {
             // The checker has said already what is wrong with a graph.
             let words = error.to_string();
             if !words.is_empty() {
-                eprintln!("error: {words}");
+                warn(&format!("error: {words}"));
             }
             ExitCode::from(NOT_RUN)
         }
@@ -220,11 +223,14 @@ fn run_and_compare(
     pace.record = Some(kept.file.clone());
     let board = args.board.clone().unwrap_or(name);
     for swept in board::host::sweep_named(Some(&board))? {
-        eprintln!("{}", crate::summary::swept(&swept));
+        warn(&crate::summary::swept(&swept));
     }
     let options = Options { board: Some(board), ..Options::default() };
     let signals = Signals::catch()?;
-    let outcome = lockstep::run(graph, &options, &pace, &signals, &mut Lines::new(true))?;
+    let console = Console::start();
+    let outcome = lockstep::run(graph, &options, &pace, &signals, &console, Face::Trouble);
+    console.flush();
+    let outcome = outcome?;
     if outcome.interrupted {
         return Err("interrupted".into());
     }

@@ -1,9 +1,10 @@
 //! What a shadow would say, against what the service says: field by field, while both run on the same inputs.
 
 use crate::cli::SwapArgs;
+use crate::console::{say, say_line};
 use crate::control::{self, Request};
 use crate::monitor::newest;
-use crate::up::Signals;
+use crate::signals::Signals;
 use board::clock;
 use board::host::{health_topic, shadow_role, shadow_topic};
 use board::place::Place;
@@ -171,15 +172,15 @@ fn compare_until_the_end(args: &SwapArgs, place: &Place, role: &str) -> Result<(
         }
         if on_terminal && now >= next_show {
             next_show = now.after(Duration::from_secs(1));
-            print!("\x1b[H\x1b[J{}", as_text(role, &topics, &steps));
-            println!("Ctrl-C ends the comparison and sends the shadow away");
+            say(&format!("\x1b[H\x1b[J{}", as_text(role, &topics, &steps)));
+            say_line("Ctrl-C ends the comparison and sends the shadow away");
         }
         tap.wait(heard, Duration::from_millis(100));
     }
     if args.json {
-        println!("{:#}", as_json(&topics, &steps));
+        say_line(&format!("{:#}", as_json(&topics, &steps)));
     } else {
-        print!("{}", as_text(role, &topics, &steps));
+        say(&as_text(role, &topics, &steps));
     }
     Ok(())
 }

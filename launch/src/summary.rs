@@ -25,8 +25,13 @@ pub(crate) fn text(word: &RunSummary, restarts: u32) -> String {
     text
 }
 
-/// The referee's word as JSON.
+/// The referee's word as a line of JSON.
 pub(crate) fn json(word: &RunSummary, restarts: u32) -> String {
+    format!("{}\n", value(word, restarts))
+}
+
+/// The referee's word as JSON.
+pub(crate) fn value(word: &RunSummary, restarts: u32) -> serde_json::Value {
     let figures: serde_json::Map<String, serde_json::Value> = word
         .figures()
         .iter()
@@ -37,10 +42,7 @@ pub(crate) fn json(word: &RunSummary, restarts: u32) -> String {
         .collect();
     let passed = matches!(word.state.get(), Ok(RunState::Passed));
     let remark = word.remark.as_str();
-    format!(
-        "{}\n",
-        serde_json::json!({"passed": passed, "remark": remark, "figures": figures, "restarts": restarts})
-    )
+    serde_json::json!({"passed": passed, "remark": remark, "figures": figures, "restarts": restarts})
 }
 
 /// What was found of a run that had not cleaned up.

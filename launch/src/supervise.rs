@@ -2,9 +2,14 @@
 
 mod cleaner;
 mod process;
+mod pulse;
+mod strays;
 mod swap;
 
+use crate::console::harmless;
 use crate::graph::{Checked, CheckedService, CheckedTopic, Overrides};
+use crate::journal::{self, Journal};
+use crate::runs::RunFolder;
 use board::host::{self, Host, HostError};
 use board::manifest::{Manifest, Topic};
 use board::switchboard::SlotState;
@@ -12,23 +17,35 @@ use board::{EXIT_SETUP, clock};
 use cleaner::Cleaner;
 use messages::{Health, Message as _, Time};
 use process::{Process, Surroundings, death};
+pub(crate) use pulse::{Pulse, vitals};
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::process::Signal;
 use std::collections::VecDeque;
 use std::io;
 use std::os::fd::{AsFd as _, OwnedFd};
+use std::os::unix::process::ExitStatusExt as _;
 use std::path::{Path, PathBuf};
+use std::process::ExitStatus;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
+use strays::Strays;
 use swap::{Newcomer, Predecessor};
 pub(crate) use swap::{SwapRequest, SwapState};
 
 /// Whoever publishes this drives the wheels, and leaves first when the robot is stopped.
 const WHEELS: &str = "wheels/applied";
-/// How long a service may take to join the board.
+/// How long a service may take to join the board, in time of its own: a map that is read, not a processor that is not to be had.
 const START_LIMIT: Duration = Duration::from_secs(10);
+/// After so long it is said that a service takes its time to join the board.
+const START_SAID: Duration = Duration::from_secs(5);
 /// A service that ran for so long was sound: its next restart is immediate again.
 const SOUND_AFTER: Duration = Duration::from_millis(500);
+/// So long after its end is asked for, a process that was killed and is still there is left to the kernel: it waits for a device.
+const KILLED_LIMIT: Duration = Duration::from_secs(5);
+/// Lines of a log in which the reason of a death is looked for.
+const LOOK_BACK: usize = 200;
+/// Between two looks at what lies in shared memory.
+const PLACE_PERIOD: Duration = Duration::from_secs(1);
 const EVENTS_KEPT: usize = 200;
 
 /// Something that the operator wants to know.
@@ -78,6 +95,9 @@ pub(crate) struct Supervised {
     failures: u32,
     restart_at: Option<Time>,
     died_at: Option<Time>,
+    pulse: Pulse,
+    /// What was last said of its slow start or its hanging, so that it is said once.
+    said: Option<u32>,
 }
 
 impl Supervised {
@@ -93,6 +113,8 @@ impl Supervised {
             failures: 0,
             restart_at: None,
             died_at: None,
+            pulse: Pulse::default(),
+            said: None,
         }
     }
 
@@ -118,15 +140,26 @@ pub(crate) struct Supervisor {
     /// What differs from the graph's file: by the command line, and by swaps since.
     pub(crate) overrides: Overrides,
     folder: PathBuf,
-    logs: PathBuf,
+    logs: RunFolder,
+    journal: Journal,
     /// Processes that were swapped out and are on their way, with the moment at which they are ended.
     leaving: Vec<(Process, Time)>,
     cleaner: Cleaner,
     last_tick: Time,
+    next_look: Time,
+    /// What happened to the board's place in shared memory, once it is gone.
+    lost: Option<String>,
+    /// What services have started and left behind.
+    strays: Strays,
+    /// What could not be left in order at the end.
+    unclean: Vec<String>,
 }
 
 impl Supervisor {
-    /// Makes the board of a checked graph; nothing is started yet.
+    /// Makes the board of a checked graph; nothing is started yet. Without a folder for the logs that was asked for, the run gets one of its own on disk.
+    ///
+    /// # Errors
+    /// When the board cannot be made, or the folder that was asked for.
     pub(crate) fn new(
         graph: &Checked,
         board: &str,
@@ -134,10 +167,14 @@ impl Supervisor {
         lockstep: bool,
     ) -> Result<Self, HostError> {
         let host = Host::create(board, manifest_of(graph), lockstep)?;
-        let logs = logs.map_or_else(|| host.place().file("logs"), Path::to_owned);
-        std::fs::create_dir_all(&logs)?;
+        let (logs, trouble) = match RunFolder::make(logs, board) {
+            Ok(folder) => (folder, None),
+            Err(error) if logs.is_some() => return Err(error.into()),
+            // A robot on a read-only disk drives all the same.
+            Err(error) => (RunFolder::make(Some(&host.place().file("logs")), board)?, Some(error)),
+        };
         let now = clock::monotonic();
-        Ok(Self {
+        let mut supervisor = Self {
             host,
             services: graph.services.iter().cloned().map(Supervised::of).collect(),
             events: VecDeque::new(),
@@ -145,16 +182,34 @@ impl Supervisor {
             began: now,
             overrides: graph.overrides.clone(),
             folder: graph.folder.clone(),
+            journal: Journal::begin(logs.path()),
             logs,
             leaving: Vec::new(),
             cleaner: Cleaner::default(),
             last_tick: now,
-        })
+            next_look: now,
+            lost: None,
+            strays: Strays::begin(),
+            unclean: Vec::new(),
+        };
+        if let Some(error) = trouble {
+            supervisor.note(
+                "",
+                format!("{error}; the logs lie in shared memory, and go with the board"),
+                true,
+            );
+        }
+        Ok(supervisor)
+    }
+
+    /// The folder of this run's logs.
+    pub(crate) fn logs(&self) -> &RunFolder {
+        &self.logs
     }
 
     /// The file into which a service logs.
-    pub(crate) fn log_file(&self, role: &str) -> PathBuf {
-        self.logs.join(format!("{role}.log"))
+    fn log_file(&self, role: &str) -> PathBuf {
+        journal::log_file(self.logs.path(), role)
     }
 
     /// Starts every service, in the order of the file; they wait for each other by themselves.
@@ -173,9 +228,10 @@ impl Supervisor {
         for index in 0..self.services.len() {
             self.reap(index, now);
             self.note_ready(index, now);
-            if !held_up {
-                self.end_if_hanging(index, now);
+            if held_up {
+                self.services[index].pulse.begin_anew();
             }
+            self.end_if_hanging(index, now);
             self.tend_newcomer(index, now);
             if self.services[index].restart_at.is_some_and(|at| at <= now) {
                 self.services[index].restart_at = None;
@@ -185,6 +241,11 @@ impl Supervisor {
         }
         self.see_off(now);
         self.tend_cleaner(now);
+        self.end_strays();
+        if now >= self.next_look {
+            self.next_look = now.after(PLACE_PERIOD);
+            self.look_at_the_place();
+        }
     }
 
     /// When `tick` is due at the latest.
@@ -219,6 +280,23 @@ impl Supervisor {
         self.services.iter().find(|service| service.phase == Phase::Failed)
     }
 
+    /// Why the board cannot go on: somebody has removed what it lies on.
+    pub(crate) fn lost(&self) -> Option<&str> {
+        self.lost.as_deref()
+    }
+
+    /// A robot whose board is gone from shared memory cannot be reached by anybody, and a second one could be started beside it.
+    fn look_at_the_place(&mut self) {
+        if self.lost.is_none() && !self.host.is_in_place() {
+            let root = self.host.place().root().display();
+            let text = format!(
+                "{root} was removed or replaced while the board was up: nobody can reach this robot any more; stopping it"
+            );
+            self.note("", text.clone(), true);
+            self.lost = Some(text);
+        }
+    }
+
     /// Ends a service and starts it again; `false` when there is none of that name.
     pub(crate) fn restart(&mut self, role: &str) -> bool {
         let Some(index) = self.services.iter().position(|service| service.service.role == role) else {
@@ -232,7 +310,7 @@ impl Supervisor {
             None => service.restart_at = Some(clock::monotonic()),
         }
         // A process that leaves when asked ends without an error; it is to come back all the same.
-        service.phase = if service.process.is_some() { Phase::Waiting } else { service.phase };
+        service.phase = Phase::Waiting;
         true
     }
 
@@ -243,8 +321,7 @@ impl Supervisor {
         };
         service.phase = Phase::Waiting;
         if let Some(mut process) = service.process.take() {
-            process.signal(Signal::KILL);
-            process.wait();
+            process.end_now(KILLED_LIMIT);
             self.host.switchboard().release(process.slot);
         }
         self.clean();
@@ -289,23 +366,23 @@ impl Supervisor {
             self.events.pop_front();
         }
         let at_s = clock::monotonic().seconds_since(self.began);
-        self.events.push_back(Event { at_s, role: role.to_owned(), text: text.into(), is_trouble });
+        let event = Event { at_s, role: role.to_owned(), text: text.into(), is_trouble };
+        self.journal.note(&event);
+        self.events.push_back(event);
         self.event_count += 1;
     }
 
-    /// The last lines of a service's log.
+    /// The last lines of a service's log, fit for a terminal.
     pub(crate) fn last_log_lines(&self, role: &str, count: usize) -> Vec<String> {
-        let text = std::fs::read(self.log_file(role)).unwrap_or_default();
-        let text = String::from_utf8_lossy(&text);
-        let lines: Vec<&str> = text.lines().collect();
-        lines[lines.len().saturating_sub(count)..].iter().map(|line| (*line).to_owned()).collect()
+        let lines = journal::last_lines(self.logs.path(), role, count);
+        lines.iter().map(|line| harmless(line)).collect()
     }
 
-    /// Stops the robot first, then the services, and takes the board down.
+    /// Stops the robot first, then the services, and takes the board down. What services could not leave in order, a sentence each.
     ///
     /// # Errors
     /// When something of the board cannot be removed.
-    pub(crate) fn stop(mut self, hurry: &dyn Fn() -> bool) -> io::Result<()> {
+    pub(crate) fn stop(mut self, hurry: &dyn Fn() -> bool) -> io::Result<Vec<String>> {
         self.cleaner.stop();
         for index in 0..self.services.len() {
             self.dismiss(index);
@@ -316,10 +393,15 @@ impl Supervisor {
         self.end(&first, hurry);
         self.end(&rest, hurry);
         for (process, _) in &mut self.leaving {
-            process.signal(Signal::KILL);
-            process.wait();
+            process.end_now(KILLED_LIMIT);
         }
-        self.host.take_down()
+        let deadline = clock::monotonic().after(KILLED_LIMIT);
+        while self.strays.end_all(self.host.place().name(), &[]) && clock::monotonic() < deadline {
+            clock::sleep(Duration::from_millis(1));
+        }
+        self.journal.end();
+        let unclean = std::mem::take(&mut self.unclean);
+        self.host.take_down().map(|()| unclean)
     }
 
     fn end(&mut self, group: &[usize], hurry: &dyn Fn() -> bool) {
@@ -335,16 +417,22 @@ impl Supervisor {
             for &index in group {
                 let service = &mut self.services[index];
                 let Some(process) = &mut service.process else { continue };
-                if process.ended().is_some() {
-                    service.process = None;
+                let Some(status) = process.ended() else {
+                    let limit =
+                        if hurry() { Duration::from_millis(50) } else { service.service.launch.stop_after };
+                    if now.since(asked) > limit {
+                        process.signal(Signal::KILL);
+                    }
+                    if now.since(asked) <= limit + KILLED_LIMIT {
+                        waiting.push(index);
+                    }
                     continue;
+                };
+                service.process = None;
+                let role = service.service.role.clone();
+                if !hurry() {
+                    self.note_last_word(&role, status);
                 }
-                let limit =
-                    if hurry() { Duration::from_millis(50) } else { service.service.launch.stop_after };
-                if now.since(asked) > limit {
-                    process.signal(Signal::KILL);
-                }
-                waiting.push(index);
             }
             if waiting.is_empty() {
                 return;
@@ -359,16 +447,50 @@ impl Supervisor {
         }
     }
 
+    /// A service that was asked to leave and could not do so in order has lost something that it was to leave behind.
+    fn note_last_word(&mut self, role: &str, status: ExitStatus) {
+        if status.success() || status.signal() == Some(libc::SIGTERM) {
+            return;
+        }
+        let how = match status.signal() {
+            Some(libc::SIGKILL) => {
+                "did not leave in time, and was killed: what it had to save is lost".to_owned()
+            }
+            _ => format!("{} as it left: {}", death(status), self.last_word(role)),
+        };
+        self.unclean.push(format!("`{role}` {how}"));
+        self.note(role, how, true);
+    }
+
     fn start(&mut self, index: usize) {
         let role = self.services[index].service.role.clone();
         match self.spawn(index) {
             Ok(process) => {
-                self.services[index].process = Some(process);
-                self.services[index].phase = Phase::Starting;
+                let service = &mut self.services[index];
+                service.process = Some(process);
+                service.phase = Phase::Starting;
+                service.pulse.begin_anew();
+                service.said = None;
             }
             Err(error) => {
-                self.services[index].phase = Phase::Failed;
-                self.note(&role, format!("cannot be started: {error}"), true);
+                // A file that is being replaced, a machine that is full: another time it may go. In logical time nothing depends on when.
+                let now = clock::monotonic();
+                let service = &mut self.services[index];
+                service.failures += 1;
+                service.died_at.get_or_insert(now);
+                let policy = service.service.launch.restart.unwrap_or_default();
+                let text = format!("cannot be started: {error}");
+                match policy.pause_after(service.failures.saturating_add(1)) {
+                    Some(pause) => {
+                        service.phase = Phase::Waiting;
+                        service.restart_at = Some(now.after(pause));
+                        self.note(&role, format!("{text}; trying again in {} ms", pause.as_millis()), true);
+                    }
+                    None => {
+                        service.phase = Phase::Failed;
+                        self.note(&role, format!("{text}; given up"), true);
+                    }
+                }
             }
         }
     }
@@ -416,16 +538,18 @@ impl Supervisor {
         let role = service.service.role.clone();
         self.host.switchboard().release(process.slot);
         service.process = None;
+        self.strays.expect();
         if self.stands_in(index, status, now) {
             return;
         }
         let service = &mut self.services[index];
-        if status.success() && service.phase == Phase::Waiting {
+        if service.phase == Phase::Waiting && (status.success() || status.signal() == Some(libc::SIGTERM)) {
+            // It was asked to leave, to be started again.
             service.restart_at = Some(now);
             service.died_at = Some(now);
             return;
         }
-        if status.success() {
+        if status.success() && service.service.launch.may_end {
             service.phase = Phase::Finished;
             self.note(&role, "has finished", false);
             return;
@@ -433,8 +557,7 @@ impl Supervisor {
         service.failures = if was_sound { 1 } else { service.failures + 1 };
         let failures = service.failures;
         // In logical time a death that nobody planned ends the run.
-        let lockstep = self.host.switchboard().header().lockstep.load(Ordering::Relaxed) != 0;
-        let policy = service.service.launch.restart.filter(|_| !lockstep);
+        let policy = service.service.launch.restart.filter(|_| !self.host.is_lockstep());
         let setup = status.code() == Some(i32::from(EXIT_SETUP));
         let how = death(status);
         let next = match policy {
@@ -443,6 +566,11 @@ impl Supervisor {
             Some(policy) => policy.pause_after(failures).ok_or_else(|| format!("{failures} deaths in a row")),
         };
         service.died_at.get_or_insert(now);
+        if (next.is_err() || self.is_on_probation(index, now)) && self.give_back(index, &how, now) {
+            self.clean();
+            return;
+        }
+        let service = &mut self.services[index];
         match next {
             Ok(pause) => {
                 service.phase = Phase::Waiting;
@@ -456,7 +584,7 @@ impl Supervisor {
             }
             Err(why) => {
                 service.phase = Phase::Failed;
-                let last = self.last_log_lines(&role, 1).pop().unwrap_or_default();
+                let last = self.last_word(&role);
                 self.note(&role, format!("{how}; given up ({why}): {last}"), true);
             }
         }
@@ -464,25 +592,71 @@ impl Supervisor {
     }
 
     fn end_if_hanging(&mut self, index: usize, now: Time) {
-        let service = &self.services[index];
+        let lockstep = self.host.is_lockstep();
+        let service = &mut self.services[index];
         let Some(process) = &service.process else { return };
         let Some(slot) = self.host.switchboard().slot(process.slot) else { return };
-        let limit = service.service.launch.hang_after;
-        let lockstep = self.host.switchboard().header().lockstep.load(Ordering::Relaxed) != 0;
-        let silence = match process.ready {
-            Some(_) if lockstep => return,
-            Some(_) => now.since(slot.heartbeat()),
-            None if now.since(process.started) > START_LIMIT => now.since(process.started),
-            None => return,
-        };
-        if silence <= limit {
+        // In logical time the conductor knows whose turn it is.
+        if process.ready.is_some() && lockstep {
             return;
         }
-        let what = if process.ready.is_none() { "did not join the board" } else { "hangs" };
-        let text = format!("{what}: silent for {:.1} s; ending it", silence.as_secs_f64());
-        process.signal(Signal::KILL);
+        let is_joining = process.ready.is_none();
+        let limit = if is_joining { START_LIMIT } else { service.service.launch.hang_after };
+        let pid = process.pid();
+        let silence = service.pulse.look(now, slot.heartbeat().as_nanos(), || vitals(pid));
         let role = service.service.role.clone();
-        self.note(&role, text, true);
+        if silence.own > limit && service.said != Some(pid) {
+            process.signal(Signal::KILL);
+            service.said = Some(pid);
+            let what = if is_joining { "did not join the board" } else { "hangs" };
+            let text = format!(
+                "{what}: silent for {:.1} s, {:.1} s of them without waiting for a processor; ending it",
+                silence.all.as_secs_f64(),
+                silence.own.as_secs_f64()
+            );
+            self.note(&role, text, true);
+        } else if is_joining && silence.all > START_SAID && service.said.is_none() {
+            service.said = Some(0);
+            let text = format!(
+                "has not joined the board after {:.0} s ({:.1} s of its own time): it reads much, or the machine is busy",
+                silence.all.as_secs_f64(),
+                silence.own.as_secs_f64()
+            );
+            self.note(&role, text, false);
+        }
+    }
+
+    /// What a service said last, in one line: the message of its panic, or the last line that is no frame of a backtrace.
+    fn last_word(&self, role: &str) -> String {
+        let lines = self.last_log_lines(role, LOOK_BACK);
+        match lines.iter().rposition(|line| line.contains("panicked at")) {
+            // The message stands below the place.
+            Some(panic) => lines[panic..].iter().take(2).cloned().collect::<Vec<_>>().join(" "),
+            None => lines.last().cloned().unwrap_or_else(|| "it has said nothing".to_owned()),
+        }
+    }
+
+    /// The last lines of a log that tell why a service cannot go on: from its panic on, if there was one.
+    pub(crate) fn telling_lines(&self, role: &str, count: usize) -> Vec<String> {
+        let mut lines = self.last_log_lines(role, LOOK_BACK);
+        let panic = lines.iter().rposition(|line| line.contains("panicked at"));
+        let begin = panic.unwrap_or(lines.len().saturating_sub(count));
+        lines.drain(..begin);
+        lines.truncate(count);
+        lines
+    }
+
+    /// What a dead service had started, and could not be ended with its group.
+    fn end_strays(&mut self) {
+        if !self.strays.are_expected() {
+            return;
+        }
+        let processes = self.services.iter().filter_map(Supervised::pid);
+        let newcomers =
+            self.services.iter().filter_map(|service| service.newcomer_process().map(Process::pid));
+        let leaving = self.leaving.iter().map(|(process, _)| process.pid());
+        let ours: Vec<u32> = processes.chain(newcomers).chain(leaving).chain(self.cleaner.pid()).collect();
+        self.strays.end_all(self.host.place().name(), &ours);
     }
 
     fn tend_cleaner(&mut self, now: Time) {

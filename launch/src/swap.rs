@@ -2,6 +2,7 @@
 
 use crate::cli::SwapArgs;
 use crate::commands::{status_of, sweep};
+use crate::console::say_line;
 use crate::control::{self, Request, Status};
 use crate::graph;
 use crate::shadow;
@@ -58,7 +59,7 @@ fn back(args: &SwapArgs, place: &Place, role: &str) -> Result<(), String> {
     match state_of(place, role)? {
         Some(_) => await_swap(args, place, role),
         None => {
-            println!("`{role}`: the newcomer was sent away");
+            say_line(&format!("`{role}`: the newcomer was sent away"));
             Ok(())
         }
     }
@@ -76,9 +77,12 @@ fn await_swap(args: &SwapArgs, place: &Place, role: &str) -> Result<(), String> 
             Some(SwapState::Done { run, took_ms, gap_ms }) => {
                 if args.json {
                     let state = serde_json::to_string(&state).map_err(|error| error.to_string())?;
-                    println!("{state}");
+                    say_line(&state);
                 } else {
-                    println!("`{role}` is played by `{run}` after {took_ms:.0} ms{}", gap_in_words(*gap_ms));
+                    say_line(&format!(
+                        "`{role}` is played by `{run}` after {took_ms:.0} ms{}",
+                        gap_in_words(*gap_ms)
+                    ));
                 }
                 return Ok(());
             }

@@ -21,8 +21,10 @@ mod keeper;
 mod logical;
 mod running;
 mod steering;
+mod terminal;
 
 pub use binaries::{build, launcher};
 pub use graph::Graph;
 pub use keeper::folder as failed_graphs;
 pub use running::{Running, signal};
+pub use terminal::OnTerminal;

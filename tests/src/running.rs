@@ -27,6 +27,8 @@ pub struct Running {
     publishers: RefCell<BTreeMap<String, TapPublisher>>,
     tap: RefCell<Option<Tap>>,
     output: PathBuf,
+    /// The folder of the services' logs.
+    logs: PathBuf,
     /// In logical time.
     steering: Option<Steering>,
     /// In host time, while the graph runs.
@@ -53,8 +55,10 @@ impl Running {
             std::fs::File::create(&output).unwrap_or_else(|error| panic!("{}: {error}", output.display()));
         let copy = file.try_clone().unwrap_or_else(|error| panic!("{}: {error}", output.display()));
         let recording = graph.is_recorded().then(|| keeper::file(&board));
+        let logs = std::env::temp_dir().join(format!("corkboard-{board}.logs"));
         let mut command = Command::new(launcher());
         command.arg("up").arg(graph.file()).args(["--no-build", "--board", &board]).args(graph.arguments());
+        command.arg("--log-dir").arg(&logs);
         if graph.is_in_lockstep() {
             command
                 .args(["--lockstep", "--steered", "--no-view"])
@@ -79,6 +83,7 @@ impl Running {
             publishers: RefCell::new(BTreeMap::new()),
             tap: RefCell::new(None),
             output,
+            logs,
             steering,
             keeper: RefCell::new(None),
             recording,
@@ -367,7 +372,8 @@ impl Running {
     /// The last lines of every service's log.
     pub fn logs(&self) -> String {
         let mut text = String::new();
-        for entry in std::fs::read_dir(self.place.file("logs")).into_iter().flatten().flatten() {
+        let entries = std::fs::read_dir(&self.logs).into_iter().flatten().flatten();
+        for entry in entries.filter(|entry| entry.path().extension().is_some_and(|end| end == "log")) {
             let log = std::fs::read_to_string(entry.path()).unwrap_or_default();
             let lines: Vec<&str> = log.lines().collect();
             if !lines.is_empty() {
@@ -401,6 +407,7 @@ impl Drop for Running {
         }
         let _ = board::host::clear(&self.place);
         let _ = std::fs::remove_file(&self.output);
+        let _ = std::fs::remove_dir_all(&self.logs);
         match self.recording.as_deref() {
             Some(file) if has_failed => eprintln!("{}", failure::report(&self.board, file, &output, &logs)),
             Some(file) => _ = std::fs::remove_file(file),

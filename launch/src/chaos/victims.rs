@@ -1,8 +1,8 @@
 //! The robot as chaos sees it: whom to hit, what the wheels are told, and who is back.
 
 use super::plan::{Deed, Kind, any};
-use super::witness::{Deadlines, Witness, Wound};
-use crate::graph::{Checked, CheckedService};
+use super::witness::{Link, Stopping, Witness, Wound};
+use crate::graph::{Checked, CheckedService, CheckedTopic};
 use crate::supervise::{Phase, Supervisor};
 use board::JoinError;
 use board::tap::{Tap, TapPublisher, TapReader};
@@ -15,32 +15,36 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 const WHEELS: &str = "wheels/applied";
+const GUARD: &str = "safety/clearance";
+/// The longest period of a driver that the promise knows.
+const PERIOD_MAX: Duration = Duration::from_millis(20);
 const ORDERS: &str = "mission/orders";
 /// A successor that has not spoken by then does not count as healed.
 const UNHEALED: Duration = Duration::from_secs(10);
 /// Messages may still be on their way when a deadline is over.
-const SETTLED: Duration = Duration::from_millis(100);
+const SETTLED: Duration = Duration::from_millis(150);
 
 /// What became of a wound.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Verdict {
     pub(super) wound: Wound,
-    /// How late the wheels were told to turn.
-    pub(super) too_late: Option<Duration>,
+    /// What the wheels did.
+    pub(super) stopping: Stopping,
 }
 
 #[derive(Debug)]
 struct Victim {
     role: String,
-    in_chain: bool,
+    link: Link,
     topics: Vec<TapReader>,
 }
 
 /// The robot under test.
 pub(super) struct Scene {
     victims: Vec<Victim>,
-    deadlines: Deadlines,
     witness: Witness,
+    /// Messages that were lost before they could be judged, so far.
+    lost: u64,
     wounds: Vec<Wound>,
     wheels: Option<TapReader>,
     truth: Option<TapReader>,
@@ -73,14 +77,20 @@ impl Scene {
         let outside = [of(&graph.view.truth), graph.finish.as_deref().and_then(of)];
         let spared = |role: &str| outside.contains(&Some(role)) || spare.iter().any(|spared| spared == role);
         let driver = of(WHEELS);
-        // Without one of these there is no fresh GO, no fresh command, or nobody to tell the motors.
-        let in_chain = |role: &str| {
-            let needs = |topic: &&crate::graph::CheckedTopic| {
-                topic.readers.iter().any(|reader| Some(reader.role.as_str()) == driver && reader.required)
+        // Whose words a service cannot do without.
+        let needs = |reader: Option<&str>, role: &str| {
+            let required = |topic: &&CheckedTopic| {
+                topic.readers.iter().any(|known| Some(known.role.as_str()) == reader && known.required)
             };
-            Some(role) == driver
-                || driver.is_some()
-                    && graph.topics.iter().filter(needs).any(|topic| topic.publisher.role() == Some(role))
+            reader.is_some()
+                && graph.topics.iter().filter(required).any(|topic| topic.publisher.role() == Some(role))
+        };
+        let guard = of(GUARD);
+        let link = |role: &str| match role {
+            role if Some(role) == driver => Link::Driver,
+            role if needs(driver, role) => Link::Word,
+            role if needs(guard, role) => Link::Readings,
+            _ => Link::None,
         };
         let mut victims = Vec::new();
         for service in graph.services.iter().filter(|service| !spared(&service.role)) {
@@ -90,7 +100,7 @@ impl Scene {
                 published.map(|topic| tap.reader(&topic.name)).collect();
             victims.push(Victim {
                 role: service.role.clone(),
-                in_chain: in_chain(&service.role),
+                link: link(&service.role),
                 topics: topics.map_err(|error| error.to_string())?,
             });
         }
@@ -100,16 +110,21 @@ impl Scene {
         let world = graph.view.world.as_ref().and_then(|world| World::load(graph.folder.join(world)).ok());
         let rooms =
             world.iter().flat_map(|world| &world.doors).map(|door| (door.floor, door.room.clone())).collect();
-        let reader = |topic: &str| tap.reader(topic).ok();
-        let (wheels, truth, mission) =
-            (reader(WHEELS), reader(&graph.view.truth), reader(&graph.view.mission));
+        // A topic of another type is none of these.
+        let reader = |topic: &str, name: &str| {
+            let (_, found) = tap.manifest().topic(topic)?;
+            (found.message.name == name).then(|| tap.reader(topic).ok())?
+        };
+        let wheels = reader(WHEELS, AppliedWheels::NAME);
+        let truth = reader(&graph.view.truth, WorldTruth::NAME);
+        let mission = reader(&graph.view.mission, MissionStatus::NAME);
         let orders = tap.publisher(ORDERS).ok();
         Ok(Self {
             victims,
-            deadlines: deadlines_of(
+            witness: Witness::new(period_of(
                 graph.services.iter().find(|service| Some(service.role.as_str()) == driver),
-            ),
-            witness: Witness::default(),
+            )),
+            lost: 0,
             wounds: Vec::new(),
             wheels,
             truth,
@@ -130,6 +145,29 @@ impl Scene {
     /// How many may be hit.
     pub(super) fn victims(&self) -> usize {
         self.victims.len()
+    }
+
+    /// The victim of a wound that was to show that the wheels stop, and has shown nothing.
+    pub(super) fn shown_nothing(&self, verdict: &Verdict) -> Option<usize> {
+        let nothing = matches!(verdict.stopping, Stopping::Stood | Stopping::HealedFirst | Stopping::Unknown);
+        let role = Some(&verdict.wound.role).filter(|_| verdict.wound.is_proof && nothing)?;
+        self.victims.iter().position(|victim| victim.role == *role)
+    }
+
+    /// Those on whom the wheels depend.
+    pub(super) fn chain(&self) -> Vec<usize> {
+        let victims = self.victims.iter().enumerate();
+        victims.filter(|(_, victim)| victim.link != Link::None).map(|(index, _)| index).collect()
+    }
+
+    /// Their names.
+    pub(super) fn chain_roles(&self) -> Vec<String> {
+        self.chain().into_iter().map(|index| self.victims[index].role.clone()).collect()
+    }
+
+    /// Whether the wheels turn, so that a wound would prove something.
+    pub(super) fn drives(&self, now: Time) -> bool {
+        self.witness.drives(now)
     }
 
     /// Their names.
@@ -175,9 +213,10 @@ impl Scene {
         self.wounds.push(Wound {
             kind: deed.kind,
             in_start_up: deed.in_start_up,
+            is_proof: deed.while_driving,
             at: now,
             generation,
-            in_chain: victim.in_chain,
+            link: victim.link,
             died: (deed.kind == Kind::Kill).then_some(now),
             healed: None,
             spoke: None,
@@ -228,8 +267,11 @@ impl Scene {
                 self.witness.told(stamp, view.message.left_mps, view.message.right_mps);
             }
         }
-        while let Some((_, bytes)) = self.truth.as_mut().and_then(TapReader::next) {
+        while let Some((envelope, bytes)) = self.truth.as_mut().and_then(TapReader::next) {
             if let Ok(view) = View::<WorldTruth>::parse(bytes) {
+                let stamp = Time::from_nanos(envelope.stamp_ns);
+                let WorldTruth { world_time_s, left_travel_m, right_travel_m, .. } = *view.message;
+                self.witness.rims(stamp, world_time_s, left_travel_m, right_travel_m);
                 self.first_contacts.get_or_insert(view.message.contacts);
                 if self.world.is_some_and(|last| last.contacts < view.message.contacts) {
                     self.contacts_at.push(contact(view.message, view.elements, &self.wounds, now));
@@ -241,6 +283,11 @@ impl Scene {
                 self.way_m += if step_m < 0.5 { step_m } else { 0.0 };
                 self.world = Some(*view.message);
             }
+        }
+        let lost = self.wheels.as_ref().map_or(0, TapReader::lost);
+        if lost > self.lost {
+            self.lost = lost;
+            self.witness.gap(now);
         }
         while let Some((_, bytes)) = self.mission.as_mut().and_then(TapReader::next) {
             self.status = View::<MissionStatus>::parse(bytes).ok().map(|view| *view.message).or(self.status);
@@ -271,13 +318,12 @@ impl Scene {
     /// The wounds about which all is known.
     pub(super) fn close_wounds(&mut self, now: Time) -> Vec<Verdict> {
         let settled = |wound: &Wound| {
-            let judged = now.since(wound.at) > self.deadlines.told + SETTLED;
+            let judged = now > self.witness.judged_at(wound).after(SETTLED);
             judged && wound.healed.is_some() || now.since(wound.at) > UNHEALED
         };
         let (closed, open) = std::mem::take(&mut self.wounds).into_iter().partition(settled);
         self.wounds = open;
-        let verdict =
-            |wound: Wound| Verdict { too_late: self.witness.too_late(&wound, self.deadlines), wound };
+        let verdict = |wound: Wound| Verdict { stopping: self.witness.judge(&wound), wound };
         Vec::into_iter(closed).map(verdict).collect()
     }
 
@@ -337,10 +383,8 @@ fn contact(truth: &WorldTruth, bodies: &[TrueBody], wounds: &[Wound], now: Time)
     )
 }
 
-/// From the parameters of the base driver, or what is usual.
-fn deadlines_of(driver: Option<&CheckedService>) -> Deadlines {
-    let parameter = |name: &str| driver.and_then(|driver| driver.parameters.get(name)?.as_u64());
-    let deadline = parameter("guard_deadline_ms").max(parameter("command_deadline_ms")).unwrap_or(100);
-    let period = parameter("period_ms").unwrap_or(20);
-    Deadlines { told: Duration::from_millis(deadline + period) }
+/// That of the base driver, as far as the promise goes.
+fn period_of(driver: Option<&CheckedService>) -> Duration {
+    let period = driver.and_then(|driver| driver.parameters.get("period_ms")?.as_u64());
+    period.map_or(PERIOD_MAX, Duration::from_millis).min(PERIOD_MAX)
 }

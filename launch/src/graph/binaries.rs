@@ -6,7 +6,6 @@ use super::find::checkout;
 use board::Interface;
 use serde_json::Value;
 use std::collections::HashMap;
-use std::io::Write as _;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -141,5 +140,5 @@ fn tell_slow(binary: &Path, file: Option<&str>, spent: Spent) {
         Some(file) => format!("`{name}` is still reading {file} ({used:.1} s of processor time)"),
         None => format!("`{name}` is still working at its answer ({used:.1} s of processor time)"),
     };
-    let _ = writeln!(std::io::stderr(), "{words}");
+    crate::console::warn(&words);
 }

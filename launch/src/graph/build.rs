@@ -1,6 +1,7 @@
 //! Building the services that a graph names, in a source checkout.
 
 use super::find::checkout;
+use crate::console::warn;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::HashMap;
 use std::io::{BufRead, BufReader, IsTerminal as _};
@@ -55,7 +56,7 @@ pub(crate) fn build(packages: &[String]) -> Result<HashMap<String, PathBuf>, Bui
         return Ok(built);
     }
     for line in complaints {
-        eprintln!("{line}");
+        warn(&line);
     }
     Err(BuildError::Failed { packages: packages.join(", ") })
 }
@@ -112,7 +113,7 @@ impl Progress {
                 words.take(4).collect::<Vec<_>>().join(" ")
             ));
         } else if word == "Compiling" {
-            self.announced.get_or_init(|| eprintln!("building {} (release) ..", self.packages));
+            self.announced.get_or_init(|| warn(&format!("building {} (release) ..", self.packages)));
         }
         true
     }

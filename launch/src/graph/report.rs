@@ -9,6 +9,7 @@ use super::find::find;
 use super::problem::{Palette, Problem, Problems, Severity};
 use super::settings::Graph;
 use super::source::Source;
+use crate::console::{say, say_line, warn_text};
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -30,7 +31,7 @@ pub(crate) struct Request {
 pub(crate) fn prepare(request: &Request) -> Option<Checked> {
     let mut problems = Problems::default();
     let checked = examine(request, &mut problems);
-    eprint!("{}", listing(&problems, &Palette::of(&std::io::stderr()), false));
+    warn_text(&listing(&problems, &Palette::of(&std::io::stderr()), false));
     checked
 }
 
@@ -40,11 +41,14 @@ pub(crate) fn check_command(request: &Request, as_json: bool) -> ExitCode {
     let checked = examine(request, &mut problems);
     if as_json {
         let list: Vec<_> = problems.sorted().into_iter().map(Problem::to_json).collect();
-        println!("{:#}", serde_json::json!({ "ok": checked.is_some(), "problems": list, "graph": checked }));
+        say_line(&format!(
+            "{:#}",
+            serde_json::json!({ "ok": checked.is_some(), "problems": list, "graph": checked })
+        ));
     } else {
-        eprint!("{}", listing(&problems, &Palette::of(&std::io::stderr()), true));
+        warn_text(&listing(&problems, &Palette::of(&std::io::stderr()), true));
         if let Some(checked) = &checked {
-            print!("{}", praise(checked, &Palette::of(&std::io::stdout())));
+            say(&praise(checked, &Palette::of(&std::io::stdout())));
         }
     }
     if checked.is_some() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
@@ -53,7 +57,7 @@ pub(crate) fn check_command(request: &Request, as_json: bool) -> ExitCode {
 /// `launch graph`.
 pub(crate) fn graph_command(request: &Request, as_dot: bool) -> ExitCode {
     let Some(checked) = prepare(request) else { return ExitCode::FAILURE };
-    print!("{}", if as_dot { dot(&checked) } else { mermaid(&checked) });
+    say(&if as_dot { dot(&checked) } else { mermaid(&checked) });
     ExitCode::SUCCESS
 }
 
@@ -68,7 +72,7 @@ pub(crate) fn prepare_recorded(
     let mut problems = Problems::default();
     let graph = load_text(file, &Source::file(name, text), overrides, &mut problems);
     let checked = graph.and_then(|graph| examine_loaded(&graph, overrides, build, &mut problems));
-    eprint!("{}", listing(&problems, &Palette::of(&std::io::stderr()), false));
+    warn_text(&listing(&problems, &Palette::of(&std::io::stderr()), false));
     checked
 }
 

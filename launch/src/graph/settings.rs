@@ -18,6 +18,9 @@ use std::time::Duration;
 const COMPUTE_MAX_MS: f64 = 60_000.0;
 /// A board has a few places more, for tools and for those who take over.
 const SERVICES_MAX: usize = SLOTS - 28;
+/// A service needs some memory to come up at all, and no robot has more than a terabyte.
+const MEMORY_MIN_MB: f64 = 64.0;
+const MEMORY_MAX_MB: f64 = 1_048_576.0;
 /// Longest name of a role, so that `health/<role>` and the like stay short enough for the transport.
 const ROLE_MAX: usize = 40;
 
@@ -87,6 +90,10 @@ pub(crate) struct LaunchSettings {
     pub(crate) stop_after: Duration,
     /// What it logs: a level, or directives such as `info,grid_planner=debug`.
     pub(crate) log: String,
+    /// Whether it may end by itself, without an error: one that plays a file, say. Any other end is a death.
+    pub(crate) may_end: bool,
+    /// How many bytes of memory it may have of its own; `None` for two gigabytes, or half of a small machine.
+    pub(crate) memory_max: Option<u64>,
 }
 
 /// When a dead service is started again.
@@ -124,27 +131,34 @@ pub(crate) enum Priority {
     Nice(i32),
 }
 
-impl Default for LaunchSettings {
+impl Default for Restart {
     fn default() -> Self {
-        let restart = Restart {
+        Self {
             backoff_min: Duration::from_millis(100),
             backoff_max: Duration::from_secs(5),
             give_up_after: 10,
-        };
+        }
+    }
+}
+
+impl Default for LaunchSettings {
+    fn default() -> Self {
         Self {
-            restart: Some(restart),
+            restart: Some(Restart::default()),
             cpu: Vec::new(),
             priority: Priority::Normal,
             compute: None,
             hang_after: Duration::from_secs(1),
             stop_after: Duration::from_secs(1),
             log: "info".to_owned(),
+            may_end: false,
+            memory_max: None,
         }
     }
 }
 
 /// What the live view shows: `[graph.view]`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ViewSettings {
     /// The world file, relative to the graph's folder; by default the default parameter `world`.
     pub(crate) world: Option<String>,
@@ -414,8 +428,17 @@ fn read_service(entry: &Entry, table: &Table, folder: &Path, problems: &mut Prob
 }
 
 fn read_launch(launch: &mut LaunchSettings, role: &str, table: &Table, problems: &mut Problems) {
-    const KEYS: [&str; 7] =
-        ["restart", "cpu", "priority", "compute_ms", "hang_after_ms", "stop_after_ms", "log"];
+    const KEYS: [&str; 9] = [
+        "restart",
+        "cpu",
+        "priority",
+        "compute_ms",
+        "hang_after_ms",
+        "stop_after_ms",
+        "log",
+        "may_end",
+        "memory_mb",
+    ];
     for entry in &table.entries {
         let value = &entry.value;
         match entry.key.as_str() {
@@ -460,6 +483,19 @@ fn read_launch(launch: &mut LaunchSettings, role: &str, table: &Table, problems:
                     "off, error, warn, info, debug, trace, or directives such as \"info,grid_planner=debug\"";
                 if let Some(log) = take(text, entry, wanted, problems) {
                     launch.log = log.to_owned();
+                }
+            }
+            "may_end" => {
+                let wanted = "true or false: whether the service may end by itself";
+                if let Some(may_end) = take(value.boolean(), entry, wanted, problems) {
+                    launch.may_end = may_end;
+                }
+            }
+            "memory_mb" => {
+                let number = value.number().filter(|number| (MEMORY_MIN_MB..=MEMORY_MAX_MB).contains(number));
+                let wanted = "megabytes from 64 to 1048576: the memory that the service may have";
+                if let Some(number) = take(number, entry, wanted, problems) {
+                    launch.memory_max = Some((number * 1024.0 * 1024.0) as u64);
                 }
             }
             _ => refuse_key(entry, &format!("[{role}.launch]"), &KEYS, problems),

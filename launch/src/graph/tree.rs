@@ -113,6 +113,11 @@ impl Node {
         if let Content::Text(text) = &self.content { Some(text) } else { None }
     }
 
+    /// Its truth value.
+    pub(crate) fn boolean(&self) -> Option<bool> {
+        if let Content::Boolean(value) = self.content { Some(value) } else { None }
+    }
+
     /// The number it is, if it is one.
     pub(crate) fn number(&self) -> Option<f64> {
         if let Content::Number(number) = &self.content { number.as_f64() } else { None }

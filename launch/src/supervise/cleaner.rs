@@ -56,6 +56,11 @@ impl Cleaner {
         if broken_off { Err(io::Error::other("it took too long and was broken off")) } else { Ok(()) }
     }
 
+    /// The helper's process.
+    pub(crate) fn pid(&self) -> Option<u32> {
+        self.helper.as_ref().map(|(helper, _)| helper.id())
+    }
+
     /// Whether a helper is at work.
     pub(crate) fn is_busy(&self) -> bool {
         self.helper.is_some()

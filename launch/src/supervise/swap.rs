@@ -19,6 +19,8 @@ use std::time::Duration;
 const SILENT_READY: Duration = Duration::from_millis(500);
 /// For so long a newcomer may take to say something on each topic on which the old one speaks; then it gets the topic all the same.
 const TAKE_OVER_LIMIT: Duration = Duration::from_millis(500);
+/// A newcomer that dies so soon after it has taken over gives the role back.
+const PROBATION: Duration = Duration::from_secs(10);
 /// Who was silent on a topic for longer than this speaks seldom there; such a topic is not waited for.
 const SPEAKS_WITHIN: Duration = Duration::from_millis(300);
 
@@ -102,6 +104,8 @@ struct Taken {
 pub(crate) struct Predecessor {
     service: CheckedService,
     overrides: Overrides,
+    /// When another one took its place.
+    replaced: Time,
 }
 
 impl Supervised {
@@ -174,12 +178,20 @@ impl Supervisor {
                 "a newcomer for `{role}` is there already; `launch swap --back {role}` sends it away"
             ));
         }
-        if service.phase != Phase::Running {
-            return Err(format!("`{role}` does not run at present; try again when it does"));
+        if self.host.is_lockstep() {
+            return Err("in logical time nothing is swapped: begin the run with --swap".to_owned());
+        }
+        let runs = service.phase == Phase::Running;
+        if request.shadow && !runs {
+            return Err(format!("`{role}` does not run at present, so there is nothing to compare with"));
         }
         let run = request.service.run.clone();
         let topics = self.topics_for(&request);
         self.host.add_topics(topics).map_err(|error| format!("the board takes no more topics: {error}"))?;
+        if !runs {
+            self.replace(index, request, is_way_back);
+            return Ok(());
+        }
         let speaker = if request.shadow { shadow_role(&role) } else { role.clone() };
         let slot = self.host.prepare(&speaker, request.shadow).ok_or("the board has no place left")?;
         let log = self.log_file(&if request.shadow { speaker } else { role.clone() });
@@ -199,6 +211,53 @@ impl Supervisor {
         service.newcomer =
             Some(Newcomer { request, process, asked: clock::monotonic(), is_way_back, taking_over: None });
         Ok(())
+    }
+
+    /// Puts a service in the place of one that does not run, and starts it.
+    fn replace(&mut self, index: usize, request: SwapRequest, is_way_back: bool) {
+        let now = clock::monotonic();
+        let (role, run) = (request.service.role.clone(), request.service.run.clone());
+        let overrides = std::mem::replace(&mut self.overrides, request.overrides);
+        let service = &mut self.services[index];
+        let former = std::mem::replace(&mut service.service, request.service);
+        let text = format!("`{run}` takes the place of `{}`, which does not run", former.run);
+        if is_way_back {
+            service.predecessors.pop();
+        } else {
+            service.predecessors.push(Predecessor { service: former, overrides, replaced: now });
+        }
+        service.failures = 0;
+        service.swap = Some(SwapState::Done { run, took_ms: 0.0, gap_ms: None });
+        match &service.process {
+            // One that is still starting, or hangs, makes way and is followed.
+            Some(process) => process.ask_to_leave(),
+            None => service.restart_at = Some(now),
+        }
+        service.phase = Phase::Waiting;
+        self.note(&role, text, false);
+    }
+
+    /// Whether a service has taken a role over only just now.
+    pub(super) fn is_on_probation(&self, index: usize, now: Time) -> bool {
+        let last = self.services[index].predecessors.last();
+        last.is_some_and(|predecessor| now.since(predecessor.replaced) < PROBATION)
+    }
+
+    /// A newcomer that cannot go on gives the role back to its predecessor; false when there is none.
+    pub(super) fn give_back(&mut self, index: usize, how: &str, now: Time) -> bool {
+        let Some(predecessor) = self.services[index].predecessors.pop() else { return false };
+        let role = predecessor.service.role.clone();
+        let back = predecessor.service.run.clone();
+        self.overrides = predecessor.overrides;
+        let service = &mut self.services[index];
+        let failed = std::mem::replace(&mut service.service, predecessor.service);
+        let why = format!("`{}` {how} after it had taken over; `{back}` has the role again", failed.run);
+        service.swap = Some(SwapState::Failed { why: why.clone() });
+        service.failures = 0;
+        service.phase = Phase::Waiting;
+        service.restart_at = Some(now);
+        self.note(&role, why, true);
+        true
     }
 
     /// Topics that the newcomer needs and the board does not have yet: its own, which nobody knew, and those of a shadow.
@@ -316,9 +375,12 @@ impl Supervisor {
         if newcomer.is_way_back {
             service.predecessors.pop();
         } else {
-            service.predecessors.push(Predecessor { service: former.clone(), overrides });
+            let service_before = former.clone();
+            service.predecessors.push(Predecessor { service: service_before, overrides, replaced: now });
         }
         service.phase = Phase::Running;
+        service.pulse.begin_anew();
+        service.said = None;
         service.failures = 0;
         service.swap = Some(SwapState::Done { run: run.clone(), took_ms, gap_ms });
         if let Some(old) = old {

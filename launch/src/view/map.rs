@@ -131,10 +131,15 @@ fn draw_body(context: &mut Context<'_>, body: &BodyMark) {
     };
     for prism in Body::of(solid).prisms() {
         match &prism.shape {
-            Shape::Polygon(polygon) => outline(context, polygon.corners(), body.pose, Color::Blue),
+            Shape::Polygon(polygon) => outline(context, polygon.corners(), body.pose, Color::LightBlue),
             Shape::Disc { centre, radius_m } => {
                 let centre = body.pose.transform(*centre);
-                context.draw(&Circle { x: centre.x, y: centre.y, radius: *radius_m, color: Color::Blue });
+                context.draw(&Circle {
+                    x: centre.x,
+                    y: centre.y,
+                    radius: *radius_m,
+                    color: Color::LightBlue,
+                });
             }
         }
     }

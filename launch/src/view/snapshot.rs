@@ -1,5 +1,6 @@
 //! What the view shows at one moment.
 
+use super::keys::Choice;
 use crate::control::Status;
 use geometry::Pose2;
 use messages::{BodyKind, Clearance, MissionStatus, RunSummary};
@@ -9,8 +10,6 @@ use messages::{BodyKind, Clearance, MissionStatus, RunSummary};
 pub(crate) struct Snapshot {
     /// Board, uptime, services, events.
     pub(crate) status: Status,
-    /// `live` or `lockstep`.
-    pub(crate) mode: &'static str,
     /// The referee's word.
     pub(crate) summary: Option<RunSummary>,
     /// What the robot is about.
@@ -19,8 +18,12 @@ pub(crate) struct Snapshot {
     pub(crate) clearance: Option<Clearance>,
     /// What moves on the map.
     pub(crate) scene: Scene,
-    /// Whether the keys are explained.
-    pub(crate) help: bool,
+    /// The last lines of the log that is shown.
+    pub(crate) log: Vec<String>,
+    /// Whether the robot goes on when the view is left.
+    pub(crate) is_attached: bool,
+    /// What the person has chosen to see.
+    pub(crate) choice: Choice,
 }
 
 /// What moves on the map.

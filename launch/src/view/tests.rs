@@ -1,5 +1,6 @@
 //! The view on screens of several sizes.
 
+use super::keys::Choice;
 use super::plan::Plan;
 use super::snapshot::{BodyMark, Scene, Snapshot};
 use super::{frame::draw, map::is_worthwhile};
@@ -95,13 +96,14 @@ fn snapshot() -> Snapshot {
             launcher_pid: 1,
             uptime_s: 3723.4,
             logs: String::new(),
+            mode: "live".to_owned(),
             services,
             events: vec![
                 event(0.05, "", "all 13 services are ready after 48 ms", false),
                 event(60.2, "tag-localiser", "died: signal 9 (KILL); starts again in 100 ms", true),
             ],
+            ..Status::default()
         },
-        mode: "live",
         summary: Some(summary),
         mission: Some(MissionStatus {
             room: FixedText::truncated("207"),
@@ -128,7 +130,9 @@ fn snapshot() -> Snapshot {
             ],
             open_doors: 0b10,
         },
-        help: false,
+        log: Vec::new(),
+        is_attached: false,
+        choice: Choice::default(),
     }
 }
 
@@ -161,7 +165,12 @@ fn without_a_map() {
 
 #[test]
 fn help_lies_on_top() {
-    let text = screen(80, 24, &Snapshot { help: true, ..snapshot() }, Some(&hall()));
+    let text = screen(
+        80,
+        24,
+        &Snapshot { choice: Choice { help: true, ..Choice::default() }, ..snapshot() },
+        Some(&hall()),
+    );
     assert!(text.contains("stop the robot, then its services"), "{text}");
 }
 

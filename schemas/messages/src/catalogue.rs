@@ -26,6 +26,7 @@ pub fn catalogue() -> Vec<Description> {
         OccupancyMap,
         Odometry,
         Order,
+        OrderReport,
         Particle,
         ParticleCloud,
         Path,

@@ -56,6 +56,36 @@ crate::state! {
     }
 }
 
+crate::state! {
+    /// What became of an order.
+    OrderState, OrderStateName {
+        /// It waits for its turn.
+        Accepted = 1,
+        /// An order with this number was accepted before; it counts once.
+        Repeated = 2,
+        /// It cannot be carried out; the remark says why.
+        Refused = 3,
+        /// It has been carried out.
+        Delivered = 4,
+    }
+}
+
+/// What became of an order. Published by `navigator` on `mission/reports`, one message for each order and change; every one counts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
+#[repr(C)]
+pub struct OrderReport {
+    /// The order's number: the customer's, or the navigator's where the customer gave none; zero for one that was refused without a number.
+    pub order_id: u64,
+    /// The room that was named.
+    pub room: RoomName,
+    /// What became of it.
+    pub state: OrderState,
+    /// Orders that wait before it, when it was accepted.
+    pub before: u32,
+    /// Why it was refused, in words; empty otherwise.
+    pub remark: FixedText<128>,
+}
+
 /// What the robot is about. Published by `navigator` on `mission/status`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]

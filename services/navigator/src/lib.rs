@@ -20,8 +20,8 @@ use docking::Docking;
 use geometry::{Pose2, World};
 use messages::{
     AppliedWheels, Clearance, DeliveryStatus, DeliveryStatusName, DoorSighting, DriveCommand, DriveMode,
-    DriveModeName, ElevatorCall, ElevatorState, FixedText, MissionStatus, Order, Parameters, Path,
-    PlanRequest, PoseEstimate, RoomName, Stamped, Time, Verdict,
+    DriveModeName, ElevatorCall, ElevatorState, FixedText, MissionStatus, Order, OrderReport, OrderStateName,
+    Parameters, Path, PlanRequest, PoseEstimate, RoomName, Stamped, Time, Verdict,
 };
 use std::time::Duration;
 use trouble::{Remedy, Watch};
@@ -57,8 +57,10 @@ pub struct Inputs<'a> {
 }
 
 /// What the navigator says; `None` where the last word still holds.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Outputs {
+    /// What became of orders: one for each that came, and for each that was carried out.
+    pub reports: Vec<OrderReport>,
     /// What the robot is about: on change, and five times a second.
     pub status: Option<MissionStatus>,
     /// The path that is wanted: when it is a new one.
@@ -190,7 +192,8 @@ impl Navigator {
 
     /// Takes orders, decides what to do next, and says so.
     pub fn step(&mut self, now: Time, inputs: Inputs<'_>) -> Outputs {
-        self.take_orders(now, inputs.orders);
+        let mut reports = self.take_orders(now, inputs.orders);
+        let job_before = (self.kept.delivered, self.kept.job.clone());
         self.count_way(now, &inputs);
         let request_before = self.request;
         let senses = self.sense(now, &inputs);
@@ -216,15 +219,24 @@ impl Navigator {
             mode: DriveMode::from(wish.mode),
             reserved: 0,
         };
-        Outputs { status: self.say(now, senses.as_ref()), request, command, call }
+        if let (before, Some(job)) = job_before
+            && self.kept.delivered > before
+        {
+            let (room, state) = (FixedText::truncated(&job.room), OrderStateName::Delivered.into());
+            reports.push(OrderReport { order_id: job.order_id, room, state, ..OrderReport::default() });
+        }
+        Outputs { reports, status: self.say(now, senses.as_ref()), request, command, call }
     }
 
-    fn take_orders(&mut self, now: Time, orders: &[Stamped<'_, Order>]) {
+    fn take_orders(&mut self, now: Time, orders: &[Stamped<'_, Order>]) -> Vec<OrderReport> {
         let by_default = self.kept.orders.take_default(&self.params.default_order, &self.building);
-        let taken = orders.iter().map(|order| self.kept.orders.take(now, order, &self.building));
-        for refused in std::iter::once(by_default).chain(taken).filter_map(Result::err).collect::<Vec<_>>() {
-            self.notice = Some((now, refused));
+        let taken = orders.iter().filter_map(|order| self.kept.orders.take(now, order, &self.building));
+        let reports: Vec<OrderReport> = by_default.into_iter().chain(taken).collect();
+        let refused = reports.iter().rev().find(|report| report.state == OrderStateName::Refused);
+        if let Some(refused) = refused {
+            self.notice = Some((now, format!("refused: {}", refused.remark)));
         }
+        reports
     }
 
     /// Adds up the way travelled forward, by the wheels.

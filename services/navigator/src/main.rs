@@ -1,7 +1,7 @@
 //! The process around `navigator`. What a delivery needs to go on is kept before anything is said, so that a successor goes on with it.
 use messages::{
     AppliedWheels, Clearance, DoorSighting, DriveCommand, ElevatorCall, ElevatorState, MissionStatus, Order,
-    Path, PlanRequest, PoseEstimate, Stamped, Time,
+    OrderReport, Path, PlanRequest, PoseEstimate, Stamped, Time,
 };
 use navigator::{Inputs, Navigator, Params, Snapshot};
 use std::process::ExitCode;
@@ -16,6 +16,7 @@ fn main() -> ExitCode {
         let mut elevator = node.optional_reference::<ElevatorState>("elevator/state")?;
         let mut wheels = node.optional_reference::<AppliedWheels>("wheels/applied")?;
         let mut status = node.publisher::<MissionStatus>("mission/status")?;
+        let mut reports = node.publisher::<OrderReport>("mission/reports")?;
         let mut request = node.publisher::<PlanRequest>("plan/request")?;
         let mut command = node.publisher::<DriveCommand>("drive/command")?;
         let mut call = node.publisher::<ElevatorCall>("elevator/call")?;
@@ -52,6 +53,7 @@ fn main() -> ExitCode {
                 },
             );
             kept.save(&navigator.snapshot());
+            outputs.reports.iter().for_each(|message| reports.publish(message));
             outputs.status.inspect(|message| status.publish(message));
             outputs.request.inspect(|message| request.publish(message));
             outputs.call.inspect(|message| call.publish(message));

@@ -29,6 +29,8 @@ pub(crate) struct Delivery {
     guard_changes: (u64, u64),
     deadline_misses: u64,
     delivered: u64,
+    /// An order is under way, or waits.
+    is_busy: bool,
     standing: Option<Halt>,
     halts: Vec<Halt>,
     fault_since: Option<Time>,
@@ -73,6 +75,7 @@ impl Delivery {
             guard_changes: (0, 0),
             deadline_misses: 0,
             delivered: 0,
+            is_busy: false,
             standing: None,
             halts: Vec::new(),
             fault_since: None,
@@ -163,6 +166,9 @@ impl Delivery {
             let error_m = self.halt_error_m(mission.room.as_str(), truth);
             self.standing = Some(Halt { order_id: mission.order_id, room: mission.room, error_m });
         }
+        let under_way = mission.order_id != 0
+            && !matches!(status, DeliveryStatusName::Delivered | DeliveryStatusName::Returning);
+        self.is_busy = mission.waiting > 0 || under_way;
         if mission.delivered > self.delivered {
             self.delivered = mission.delivered;
             self.halts.extend(self.standing.take());
@@ -206,16 +212,20 @@ impl Delivery {
                 "a delivery is reported, but the robot did not stand at the door".to_owned(),
             );
         }
-        if self.delivered >= params.deliveries.into() {
+        // Whoever has ordered meanwhile gets a coffee too.
+        if self.delivered >= params.deliveries.into() && !self.is_busy {
             let rooms: Vec<_> = self.halts.iter().map(|halt| halt.room.to_string()).collect();
-            let nearest =
-                self.nearest.map(|nearest| format!("; nearest {}", self.name(nearest))).unwrap_or_default();
-            return (RunState::Passed, format!("delivered to {}{nearest}", rooms.join(", ")));
+            return (RunState::Passed, format!("delivered to {}", rooms.join(", ")));
         }
         if params.time_limit_s > 0.0 && self.now_s > params.time_limit_s {
             return (RunState::Failed, format!("not done after {:.0} s", params.time_limit_s));
         }
-        (RunState::Running, format!("{} of {} delivered", self.delivered, params.deliveries))
+        let more = if self.is_busy && self.delivered >= params.deliveries.into() {
+            ", and more are ordered"
+        } else {
+            ""
+        };
+        (RunState::Running, format!("{} of {} delivered{more}", self.delivered, params.deliveries))
     }
 
     /// What was near, and from where, in words.

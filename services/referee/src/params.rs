@@ -33,7 +33,7 @@ pub struct Params {
     /// A summary is published so often.
     #[schemars(range(min = 10, max = 10000))]
     pub period_ms: u32,
-    /// Deliveries after which the run has passed.
+    /// Deliveries after which the run has passed, once no order is under way and none waits.
     #[schemars(range(min = 1, max = 1000))]
     pub deliveries: u32,
     /// How far from the door's centre line, along the hallway, the robot may halt.

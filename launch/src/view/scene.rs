@@ -1,41 +1,27 @@
-//! The view on a terminal, fed from the board.
+//! What moves on the map, read from the board as any tool reads it.
 
-use super::frame::draw;
-use super::plan::Plan;
+use super::keys::Choice;
 use super::snapshot::{BodyMark, Scene, Snapshot};
-use crate::graph::{Checked, ViewSettings};
-use crate::monitor::{Monitor, newest};
-use crate::supervise::Supervisor;
-use crate::up::Display;
-use board::tap::TapReader;
-use crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
-use geometry::{Pose2, World};
-use messages::{BodyKind, Clearance, Message, MissionStatus, Path, PoseEstimate, TruePose, View, WorldTruth};
-use ratatui::DefaultTerminal;
-use std::path::PathBuf;
-use std::time::Duration;
+use crate::control::Status;
+use crate::graph::ViewSettings;
+use crate::monitor::newest;
+use board::place::Place;
+use board::tap::{Tap, TapReader};
+use geometry::Pose2;
+use messages::{
+    BodyKind, Clearance, Message, MissionStatus, Path, PoseEstimate, RunSummary, TruePose, View, WorldTruth,
+};
 
 /// Places of the robot's trail that are kept, and how far they lie apart.
 const TRAIL_MAX: usize = 2000;
 const TRAIL_STEP_M: f64 = 0.1;
 
-/// Holds the terminal while a graph runs.
-pub(crate) struct Live {
-    terminal: Terminal,
-    settings: ViewSettings,
-    graph: PathBuf,
-    plan: Option<Plan>,
-    readers: Option<Readers>,
-    snapshot: SceneState,
-    help: bool,
-    leaving: bool,
-}
-
-/// The terminal is taken with the first frame, so that what goes wrong before is read as lines.
-enum Terminal {
-    NotYet,
-    Ours(Box<DefaultTerminal>),
-    GivenBack,
+/// Reads the topics that a view shows; one that the graph lacks, or that is of another type, is left out.
+pub(crate) struct SceneReader {
+    readers: Readers,
+    state: SceneState,
+    /// Holds the place on the board.
+    _tap: Option<Tap>,
 }
 
 #[derive(Default)]
@@ -44,9 +30,11 @@ struct SceneState {
     has_truth: bool,
     mission: Option<MissionStatus>,
     clearance: Option<Clearance>,
+    summary: Option<RunSummary>,
 }
 
 /// What is read for the view; each may be missing in a graph.
+#[derive(Default)]
 struct Readers {
     truth: Option<TapReader>,
     true_pose: Option<TapReader>,
@@ -54,95 +42,44 @@ struct Readers {
     path: Option<TapReader>,
     mission: Option<TapReader>,
     clearance: Option<TapReader>,
+    summary: Option<TapReader>,
 }
 
-impl Live {
-    /// A view of this graph.
-    pub(crate) fn new(graph: &Checked) -> Self {
-        // A world that cannot be read is the simulator's to refuse; the view does without.
-        let world = graph.view.world.as_ref().and_then(|world| World::load(graph.folder.join(world)).ok());
-        Self {
-            terminal: Terminal::NotYet,
-            settings: graph.view.clone(),
-            graph: graph.file.clone(),
-            plan: world.as_ref().map(Plan::of),
-            readers: None,
-            snapshot: SceneState::default(),
-            help: false,
-            leaving: false,
-        }
+impl SceneReader {
+    /// Joins the board.
+    pub(crate) fn open(place: &Place, settings: &ViewSettings) -> Self {
+        let tap = Tap::join(place.clone(), "view").ok();
+        let readers = tap.as_ref().map(|tap| Readers::open(tap, settings)).unwrap_or_default();
+        Self { readers, state: SceneState::default(), _tap: tap }
     }
 
-    fn read_keys(&mut self) {
-        while event::poll(Duration::ZERO).unwrap_or(false) {
-            let Ok(event) = event::read() else { return };
-            let Event::Key(key) = event else { continue };
-            if key.kind != KeyEventKind::Press {
-                continue;
-            }
-            match key.code {
-                KeyCode::Char('q') => self.leaving = true,
-                // A terminal in raw mode sends no signal for it.
-                KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => self.leaving = true,
-                KeyCode::Char('?' | 'h') => self.help = !self.help,
-                KeyCode::Esc => self.help = false,
-                _ => {}
-            }
-        }
-    }
-}
-
-impl Display for Live {
-    fn show(&mut self, supervisor: &Supervisor, monitor: &mut Monitor) {
-        if matches!(self.terminal, Terminal::NotYet) {
-            // Without a terminal the run goes on unseen.
-            self.terminal = ratatui::try_init()
-                .map_or(Terminal::GivenBack, |terminal| Terminal::Ours(Box::new(terminal)));
-        }
-        self.read_keys();
-        let readers = self.readers.get_or_insert_with(|| Readers::open(monitor, &self.settings));
-        self.snapshot.update(readers);
-        let snapshot = Snapshot {
-            status: monitor.status(supervisor, &self.graph),
-            mode: "live",
-            summary: monitor.summary().copied(),
-            mission: self.snapshot.mission,
-            clearance: self.snapshot.clearance,
-            scene: self.snapshot.scene.clone(),
-            help: self.help,
-        };
-        if let Terminal::Ours(terminal) = &mut self.terminal {
-            // A terminal that is gone sends a signal, which ends the run.
-            let _ = terminal.draw(|frame| draw(frame, &snapshot, self.plan.as_ref()));
-        }
+    /// Takes in what came since the last look.
+    pub(crate) fn update(&mut self) {
+        self.state.update(&mut self.readers);
     }
 
-    fn wants_to_leave(&mut self) -> bool {
-        self.leaving
-    }
-
-    fn close(&mut self) {
-        // The readers hold places on the board.
-        self.readers = None;
-        if matches!(std::mem::replace(&mut self.terminal, Terminal::GivenBack), Terminal::Ours(_)) {
-            ratatui::restore();
+    /// Everything that one frame shows.
+    pub(crate) fn snapshot(&self, status: Status, log: Vec<String>) -> Snapshot {
+        Snapshot {
+            status,
+            summary: self.state.summary,
+            mission: self.state.mission,
+            clearance: self.state.clearance,
+            scene: self.state.scene.clone(),
+            log,
+            is_attached: false,
+            choice: Choice::default(),
         }
-    }
-}
-
-impl Drop for Live {
-    fn drop(&mut self) {
-        self.close();
     }
 }
 
 impl Readers {
-    fn open(monitor: &Monitor, settings: &ViewSettings) -> Self {
-        // A topic that the graph lacks, or that is of another type, is left out.
+    fn open(tap: &Tap, settings: &ViewSettings) -> Self {
         let reader = |topic: &str, name: &str| {
-            let (_, found) = monitor.tap.manifest().topic(topic)?;
-            (found.message.name == name).then(|| monitor.tap.reader(topic).ok())?
+            let (_, found) = tap.manifest().topic(topic)?;
+            (found.message.name == name).then(|| tap.reader(topic).ok())?
         };
+        let summary = tap.manifest().topics.iter().find(|topic| topic.message.name == RunSummary::NAME);
         Self {
             truth: reader(&settings.truth, WorldTruth::NAME),
             true_pose: reader("truth/pose", TruePose::NAME),
@@ -150,6 +87,7 @@ impl Readers {
             path: reader(&settings.path, Path::NAME),
             mission: reader(&settings.mission, MissionStatus::NAME),
             clearance: reader(&settings.clearance, Clearance::NAME),
+            summary: summary.and_then(|topic| tap.reader(&topic.name).ok()),
         }
     }
 }
@@ -158,6 +96,7 @@ impl SceneState {
     fn update(&mut self, readers: &mut Readers) {
         self.mission = readers.mission.as_mut().and_then(newest).or(self.mission);
         self.clearance = readers.clearance.as_mut().and_then(newest).or(self.clearance);
+        self.summary = readers.summary.as_mut().and_then(newest).or(self.summary);
         if let Some(reader) = &mut readers.truth
             && let Some((truth, bodies)) = newest_with_elements::<WorldTruth>(reader)
         {
