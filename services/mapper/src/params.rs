@@ -17,7 +17,7 @@ pub struct Params {
     #[schemars(extend("format" = "path"))]
     pub load: String,
     /// ROS map file (YAML) that is written, with an image beside it, at the end; empty for none. The run
-    /// fails when it cannot be.
+    /// fails when it cannot be, or takes longer than `stop_after_ms` of the graph.
     #[schemars(extend("format" = "path"))]
     pub save: String,
     /// The map is also written this often while it changes, so that less is lost; 0 for at the end only.

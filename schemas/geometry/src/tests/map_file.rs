@@ -313,6 +313,28 @@ fn grids() -> impl Strategy<Value = OccupancyGrid> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
     #[test]
+    fn a_damaged_map_is_read_or_refused(
+        at: prop::sample::Index, length in 0..12_usize, with in "[0-9\\-\\[\\]{}&*:#|>?!, \nae.]{0,12}", byte: u8, of_image: prop::sample::Index,
+    ) {
+        let folder = tempfile::tempdir().expect("a folder");
+        let yaml = folder.path().join("map.yaml");
+        let mut text = GOOD.to_owned();
+        let begin = at.index(text.len());
+        text.replace_range(begin..(begin + length).min(text.len()), &with);
+        let mut image = b"P5\n3 2\n255\n\x00\x40\x80\xc0\xfe\xff".to_vec();
+        let place = of_image.index(image.len());
+        image[place] = byte;
+        std::fs::write(folder.path().join("map.pgm"), image).expect("written");
+        for text in [text.as_str(), GOOD] {
+            std::fs::write(&yaml, text).expect("written");
+            // What its head promises is what it is.
+            if let Ok(grid) = OccupancyGrid::load(&yaml) {
+                prop_assert_eq!(*grid.frame(), OccupancyGrid::look(&yaml).expect("it loads"));
+            }
+        }
+    }
+
+    #[test]
     fn maps_survive_their_files(grid in grids(), name in "[a-z #'\"\\\\]{1,9}") {
         let folder = tempfile::tempdir().expect("a folder");
         let yaml = folder.path().join(format!("{name}x.yaml"));

@@ -1,5 +1,6 @@
 use crate::world::{Door, DoorGeometry, World};
 use crate::{Point2, Pose2, Segment};
+use proptest::prelude::*;
 
 const EXAMPLE: &str = include_str!("../../tests/example-world.toml");
 
@@ -231,4 +232,29 @@ fn nonsense_is_refused() {
 fn an_unreadable_file_is_named() {
     let error = World::load("/nonexistent/world.toml").expect_err("there is none").to_string();
     assert!(error.contains("/nonexistent/world.toml"), "{error}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+    #[test]
+    fn a_damaged_world_is_read_or_refused(
+        at: prop::sample::Index, length in 0..30_usize, with in "[0-9\\-\\[\\]{}=\"#, \na-e.]{0,12}", number: prop::sample::Index,
+        value in prop::sample::select(vec!["0.0", "-1.0", "1e9", "1e300", "nan", "inf", "-0.0", "1e-300", "16777216"]),
+    ) {
+        let mut pieces = vec![EXAMPLE.to_owned(); 2];
+        let begin = at.index(EXAMPLE.len());
+        if EXAMPLE.is_char_boundary(begin) && EXAMPLE.is_char_boundary((begin + length).min(EXAMPLE.len())) {
+            pieces[0].replace_range(begin..(begin + length).min(EXAMPLE.len()), &with);
+        }
+        let numbers: Vec<_> = EXAMPLE.match_indices(|letter: char| letter.is_ascii_digit()).map(|(at, _)| at).collect();
+        let digit = *number.get(&numbers);
+        pieces[1].replace_range(digit..digit + 1, value);
+        for text in pieces {
+            let Ok(world) = World::parse(&text) else { continue };
+            for floor in &world.floors {
+                let _ = world.wall_segments(floor.number).len() + world.openings_of(floor.number).count();
+                let _ = world.scene(floor.number);
+            }
+        }
+    }
 }
