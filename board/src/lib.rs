@@ -35,7 +35,7 @@ mod transport;
 pub use interface::{About, Direction, Interface, PortDescription};
 pub use kept::Kept;
 pub use lack::Lack;
-pub use node::{JoinError, Node};
+pub use node::{Declared, JoinError, Node};
 pub use port::{Latest, Loan, Publisher, Queue, Reader};
 pub use run::{EXIT_SETUP, SetupError, run};
 pub use transport::{Envelope, TransportError};

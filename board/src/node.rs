@@ -84,6 +84,11 @@ pub enum JoinError {
     Transport(#[from] TransportError),
 }
 
+/// A service has said what it is, and was asked for nothing more: see [`Node::declared`].
+#[derive(Debug, Clone, Copy, thiserror::Error)]
+#[error("only asked what it is, this service does not start")]
+pub struct Declared;
+
 /// A process's place on a board.
 pub(crate) struct Joined {
     pub(crate) shared: Rc<Shared>,
@@ -368,6 +373,19 @@ impl Node {
     /// The service takes a step at least once in every such period, on the multiples of it.
     pub fn every(&mut self, period: Duration) {
         self.period = Some(period.max(Duration::from_micros(10)));
+    }
+
+    /// Says that all ports are declared, and that what follows may take its time, such as reading a map. Hand
+    /// the result on with `?`.
+    ///
+    /// A service that is only asked for its interface goes no further, so what it is does not wait for its
+    /// data. What stands before should be quick, and refuse what is wrong: parameters, a map's header, a log
+    /// that is not there.
+    ///
+    /// # Errors
+    /// When the service is only asked for its interface.
+    pub fn declared(&self) -> Result<(), Declared> {
+        if self.joined.is_some() { Ok(()) } else { Err(Declared) }
     }
 
     /// A state that outlives the process: saved by its predecessor of the same role, restored after a crash or a swap.

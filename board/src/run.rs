@@ -6,7 +6,7 @@ use crate::health::StepTimes;
 use crate::host;
 use crate::interface::{About, Interface};
 use crate::lack::Lack;
-use crate::node::{JoinError, Joined, Node};
+use crate::node::{Declared, JoinError, Joined, Node};
 use crate::place::Place;
 use crate::port::{PublisherLink, bytes_of, release_held};
 use crate::shared::Shared;
@@ -36,8 +36,8 @@ const HEALTH_PERIOD: Duration = Duration::from_secs(1);
 /// Runs a service: reads its command line, joins its board, lets `setup` declare ports and build the step, and takes steps until
 /// it is asked to leave.
 ///
-/// `setup` is also run without a board and with default parameters, to answer `--interface`; it must have no effect before
-/// its first step.
+/// `setup` is also run without a board and with default parameters, to answer `--interface`, up to
+/// [`Node::declared`]; it must have no effect before its first step.
 pub fn run<P, S>(about: About, setup: impl Fn(&mut Node, P) -> Result<S, SetupError>) -> ExitCode
 where
     P: Parameters,
@@ -171,7 +171,12 @@ fn describe(
     make: &dyn Fn(&mut Node, serde_json::Value) -> Result<Step, SetupError>,
 ) -> Result<(), SetupError> {
     let mut node = Node::describing(about.name);
-    drop(make(&mut node, parameters(arguments)?)?);
+    match make(&mut node, parameters(arguments)?) {
+        Ok(step) => drop(step),
+        // Its ports are all declared; the rest would only take time.
+        Err(error) if error.is::<Declared>() => {}
+        Err(error) => return Err(error),
+    }
     let interface = Interface {
         service: about.name.to_owned(),
         version: about.version.to_owned(),

@@ -1,5 +1,6 @@
 //! Graph files: reading, checking against the binaries, drawing.
 
+mod ask;
 mod binaries;
 mod build;
 mod check;
@@ -7,6 +8,8 @@ mod diagram;
 mod faults;
 mod file;
 mod find;
+mod log_level;
+mod paths;
 mod problem;
 mod report;
 mod schema;

@@ -131,6 +131,9 @@ impl Origins {
     }
 }
 
+/// Larger files are no part of what a recording knows again: no binary, map or log is.
+const HASHED_MAX: u64 = 256 << 20;
+
 fn hash(file: &Path) -> Option<String> {
-    Some(blake3::hash(&std::fs::read(file).ok()?).to_hex().chars().take(32).collect())
+    Some(blake3::hash(&files::read(file, HASHED_MAX).ok()?).to_hex().chars().take(32).collect())
 }

@@ -1,9 +1,10 @@
 //! A message's bytes as CDR and back, by its description alone.
 //!
-//! Plain CDR (XCDR1, OMG DDS-XTypes 1.3, 7.4.3) aligns every number to its own size, counted from behind the 4-byte header; structures and
-//! arrays have no alignment of their own. The fixed part of our messages, which has no padding, is that already, byte for byte: it is one run to
-//! copy. The elements follow as a sequence: a `uint32` count and the elements, which may begin at a multiple of four where in memory it is one
-//! of eight. All layouts are computed once, when the recording is opened; a message is then a handful of copies.
+//! Plain CDR (XCDR1, OMG DDS-XTypes 1.3, 7.4.3) aligns every number to its own size, counted from behind the
+//! 4-byte header; structures and arrays have no alignment of their own. The fixed part of our messages, which
+//! has no padding, is that already, byte for byte: it is one run to copy. The elements follow as a sequence:
+//! a `uint32` count and the elements, which may begin at a multiple of four where in memory it is one of
+//! eight. All layouts are computed once, when the recording is opened; a message is then a handful of copies.
 
 use messages::ros2msg::flattened;
 use messages::{Description, Kind, elements_offset};
@@ -12,6 +13,13 @@ use messages::{Description, Kind, elements_offset};
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 /// The largest fixed part that is believed.
 const FIXED_MAX: usize = 64 << 20;
+/// The largest message in memory that is believed: a map of 64 MiB, and more.
+pub(crate) const MESSAGE_MAX: usize = 80 << 20;
+/// Rust's layout puts at most seven bytes beside each that is used.
+const BYTES_PER_BYTE_MAX: usize = 8;
+
+/// The most separate numbers that are laid out one by one: ours have a hundred.
+const LEAVES_MAX: usize = 4000;
 
 /// A description that contradicts itself; those that `#[derive(Message)]` makes never do.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -27,6 +35,22 @@ pub enum InvalidDescription {
         end: usize,
         /// The message's size.
         size: usize,
+    },
+    /// More separate numbers than anything that can be meant.
+    #[error("`{message}` has more than {LEAVES_MAX} separate numbers; arrays of numbers count as one")]
+    TooManyFields {
+        /// The message.
+        message: String,
+    },
+    /// Much more room than its fields fill: a few bytes of a file would ask for any amount of memory.
+    #[error("`{message}` is laid out in {size} bytes, of which its fields fill {filled}")]
+    Hollow {
+        /// The message.
+        message: String,
+        /// Bytes that it or its element is said to have.
+        size: usize,
+        /// Bytes that hold something.
+        filled: usize,
     },
     /// Larger than anything that can be meant.
     #[error("`{message}` has {size} bytes; {FIXED_MAX} is the limit")]
@@ -139,15 +163,33 @@ impl Codec {
     /// # Errors
     /// When the description contradicts itself.
     pub fn new(description: &Description) -> Result<Self, InvalidDescription> {
+        let named = |error| match error {
+            InvalidDescription::TooManyFields { .. } => {
+                InvalidDescription::TooManyFields { message: description.name.clone() }
+            }
+            error => error,
+        };
         let mut leaves = Vec::new();
-        record_leaves(description, 0, &mut leaves)?;
+        let hollow = |size, leaves: &[Leaf]| {
+            let filled: usize = leaves.iter().map(|leaf| leaf.bytes).sum();
+            let message = || description.name.clone();
+            let is_hollow = size / BYTES_PER_BYTE_MAX > filled;
+            if is_hollow {
+                Err(InvalidDescription::Hollow { message: message(), size, filled })
+            } else {
+                Ok(())
+            }
+        };
+        record_leaves(description, 0, &mut leaves).map_err(named)?;
+        hollow(description.size, &leaves)?;
         let fixed = Layout::new(&leaves, 0);
         let elements = match description.element.as_ref().filter(|element| element.size() > 0) {
             None => None,
             Some(element) => {
                 let (kind, _) = flattened(element);
                 let mut leaves = Vec::new();
-                kind_leaves(kind, 0, &mut leaves)?;
+                kind_leaves(kind, 0, &mut leaves).map_err(named)?;
+                hollow(kind.size(), &leaves)?;
                 let layouts: [Layout; 8] = std::array::from_fn(|phase| Layout::new(&leaves, phase));
                 let unit = kind.size();
                 // After eight elements every position that can come has come.
@@ -218,6 +260,9 @@ impl Codec {
         let count = body.get(at..).and_then(|rest| rest.first_chunk::<4>()).ok_or(misfit)?;
         let count = u32::from_le_bytes(*count) as usize;
         at += 4;
+        if count.saturating_mul(elements.unit) > MESSAGE_MAX - self.size {
+            return Err(misfit);
+        }
         let mut left = count;
         while left > 0 {
             let rest = body.get(at..).ok_or(misfit)?;
@@ -266,15 +311,22 @@ fn record_leaves(
     Ok(())
 }
 
-/// The caller has checked that the kind's size is sound, which bounds the number of leaves.
 fn kind_leaves(kind: &Kind, base: usize, leaves: &mut Vec<Leaf>) -> Result<(), InvalidDescription> {
     match flattened(kind) {
         (Kind::Record(description), count) => {
             for index in 0..count {
+                let before = leaves.len();
                 record_leaves(description, base + index * description.size, leaves)?;
+                if leaves.len() == before {
+                    // None of the others has any, either.
+                    break;
+                }
             }
         }
         (number, count) => {
+            if leaves.len() >= LEAVES_MAX {
+                return Err(InvalidDescription::TooManyFields { message: String::new() });
+            }
             leaves.push(Leaf { offset: base, bytes: number.size() * count, align: number.size() });
         }
     }

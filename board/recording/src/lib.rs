@@ -1,9 +1,10 @@
 //! Recordings: every message of a board, written while it runs and read back to the byte.
 //!
-//! A recording is an MCAP file (<https://mcap.dev/spec>) of profile `ros2`: each topic a channel of encoding `cdr` with a generated
-//! `ros2msg` schema, so that the tools of ROS 2 and Foxglove read it. What they do not know lies beside it where they do not look: the table of
-//! contents with the descriptions of all messages as metadata, and the rest of the envelope in private records (see [`mod@format`]). The
-//! crate knows neither the board nor the clock: moments come in as arguments.
+//! A recording is an MCAP file (<https://mcap.dev/spec>) of profile `ros2`: each topic a channel of encoding
+//! `cdr` with a generated `ros2msg` schema, so that the tools of ROS 2 and Foxglove read it. What they do not
+//! know lies beside it where they do not look: the table of contents with the descriptions of all messages as
+//! metadata, and the rest of the envelope in private records (see [`mod@format`]). The crate knows neither
+//! the board nor the clock: moments come in as arguments.
 
 pub mod format;
 
@@ -22,7 +23,8 @@ pub use compare::{Difference, Digest, Digester, first_difference};
 pub use read::{Message, Messages, Recording};
 pub use write::{Counts, Recorder};
 
-/// The note that says when the recording began, in nanoseconds of the board's clock: older messages lay on the board already.
+/// The note that says when the recording began, in nanoseconds of the board's clock: older messages lay on
+/// the board already.
 pub const BEGIN_NOTE: &str = "begin_ns";
 /// The note that says how many messages were lost, as a JSON object by topic.
 pub const LOST_NOTE: &str = "lost";
@@ -45,7 +47,8 @@ pub struct Topic {
     pub message: Description,
 }
 
-/// What a recording is of: enough to build the board's topics again, and to show every message, without knowing a single type.
+/// What a recording is of: enough to build the board's topics again, and to show every message, without
+/// knowing a single type.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, Default)]
 pub struct Manifest {
     /// The graph that ran.
@@ -84,6 +87,9 @@ pub struct Envelope {
 /// Why a recording cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
+    /// The file is not there, or no plain file.
+    #[error(transparent)]
+    File(#[from] files::FileError),
     /// The file system.
     #[error("{}: {cause}", path.display())]
     Io {
@@ -101,6 +107,18 @@ pub enum RecordingError {
         /// What is wrong.
         #[source]
         cause: Box<mcap::McapError>,
+    },
+    /// More than is read of a recording at once.
+    #[error("{}: {count} {what} are more than the {limit} that are read", path.display())]
+    TooMuch {
+        /// The recording.
+        path: PathBuf,
+        /// What there is too much of.
+        what: &'static str,
+        /// How much.
+        count: u64,
+        /// The limit.
+        limit: u64,
     },
     /// The file is something else, or was cut before its table of contents.
     #[error("{} is no recording: {why}", path.display())]
@@ -186,7 +204,14 @@ impl RecordingError {
     }
 }
 
+/// A board holds 256 topics; a robot's history with all its swaps and shadows a few more.
+const TOPICS_MAX: usize = 1024;
+
 fn codecs(path: &Path, manifest: &Manifest) -> Result<Vec<Codec>, RecordingError> {
+    if manifest.topics.len() > TOPICS_MAX {
+        let (path, count, limit) = (path.to_owned(), manifest.topics.len() as u64, TOPICS_MAX as u64);
+        return Err(RecordingError::TooMuch { path, what: "topics", count, limit });
+    }
     manifest.topics.iter().map(|topic| codec(path, topic)).collect()
 }
 

@@ -1,5 +1,6 @@
 //! Reading a recording, whole or cut.
 
+use crate::cdr::MESSAGE_MAX;
 use crate::format::{CONTEXT, Context, METADATA, METADATA_END, MISFIT, VERSION, read_misfit, take};
 use crate::{Codec, Envelope, Manifest, RecordingError, Topic, codecs};
 use mcap::records::{Record, op};
@@ -10,15 +11,31 @@ use std::fs::File;
 use std::ops::Range;
 use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 use zerocopy::IntoBytes as _;
 
-/// The largest record that is believed.
-const RECORD_MAX: u64 = 1 << 30;
+/// The largest chunk that is believed, packed or not, and the most that its messages take in memory: ours
+/// have 1 MiB, or one message that is larger.
+const CHUNK_MAX: u64 = MESSAGE_MAX as u64;
+/// Messages of one chunk: as many as of the shortest fit into one of ours, ten times over.
+const CHUNK_MESSAGES_MAX: usize = 250_000;
+/// A recording that would unpack to more than so much, and to more than so many times its size, is none: it
+/// would keep a reader busy for ever. What a robot says shrinks to a tenth; where it says the same map again
+/// and again, to a hundredth.
+const UNPACKED_MAX: u64 = 1 << 30;
+const UNPACKED_TIMES_MAX: u64 = 400;
+/// The largest table of contents or note that is believed.
+const METADATA_MAX: u64 = 16 << 20;
+/// What is read ahead where chunks overlap in time, in bytes and messages: ours overlap by one.
+const AHEAD_MAX: usize = 256 << 20;
+const AHEAD_MESSAGES_MAX: usize = 1_000_000;
 /// Opcode and length.
 const HEAD: u64 = 9;
+/// Of a chunk's head: two stamps, the unpacked size, its checksum.
+const CHUNK_HEAD: usize = 8 + 8 + 8 + 4;
 
-/// A recording that is open for reading. Opening reads the table of contents and the places of the chunks; messages are read when asked for.
+/// A recording that is open for reading. Opening reads the table of contents and the places of the chunks;
+/// messages are read when asked for.
 #[derive(Debug)]
 pub struct Recording {
     path: PathBuf,
@@ -36,6 +53,9 @@ pub struct Recording {
 struct ChunkPlace {
     record: Range<u64>,
     first_stamp_ns: u64,
+    last_stamp_ns: u64,
+    /// Bytes that it says to unpack to.
+    unpacked: u64,
 }
 
 /// A message of a recording.
@@ -57,14 +77,15 @@ impl Message {
 }
 
 impl Recording {
-    /// Opens a recording, also one that was cut or is still being written: it then ends with its last whole chunk.
+    /// Opens a recording, also one that was cut or is still being written: it then ends with its last whole
+    /// chunk.
     ///
     /// # Errors
     /// When the file cannot be read, is something else, or was cut before its table of contents.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let io = || RecordingError::io(path);
         let not = |why: &str| RecordingError::NotARecording { path: path.to_owned(), why: why.to_owned() };
-        let file = File::open(path).map_err(io())?;
+        let file = files::open(path, u64::MAX)?;
         let length = file.metadata().map_err(io())?.len();
         let mut magic = [0; 8];
         if length < 8 {
@@ -78,11 +99,14 @@ impl Recording {
         let mut notes = BTreeMap::new();
         let mut chunks = Vec::new();
         let mut complete = false;
+        let mut unpacked = 0_u64;
         let mut at = 8;
-        while let Some((opcode, record)) = record_at(&file, at, length).map_err(io())? {
+        let mut heads = Heads::new(&file, length);
+        while let Some((opcode, record)) = heads.record_at(at).map_err(io())? {
             at = record.end;
             match opcode {
-                op::METADATA => {
+                // Too large a note is none.
+                op::METADATA if record.end - record.start <= METADATA_MAX => {
                     let body = read_range(&file, record.start + HEAD..record.end).map_err(io())?;
                     let Ok(Record::Metadata(metadata)) = mcap::parse_record(opcode, &body) else { continue };
                     if metadata.name == METADATA {
@@ -92,12 +116,21 @@ impl Recording {
                     }
                 }
                 op::CHUNK => {
-                    let mut stamp = [0; 8];
-                    if record.end - record.start < HEAD + 8 {
+                    let mut head = [0; CHUNK_HEAD];
+                    if record.end - record.start < HEAD + CHUNK_HEAD as u64 {
                         break;
                     }
-                    file.read_exact_at(&mut stamp, record.start + HEAD).map_err(io())?;
-                    chunks.push(ChunkPlace { record, first_stamp_ns: u64::from_le_bytes(stamp) });
+                    file.read_exact_at(&mut head, record.start + HEAD).map_err(io())?;
+                    let number =
+                        |at: usize| head[at..].first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+                    let chunk = ChunkPlace {
+                        record,
+                        first_stamp_ns: number(0),
+                        last_stamp_ns: number(8),
+                        unpacked: number(16),
+                    };
+                    unpacked = unpacked.saturating_add(chunk.unpacked.min(CHUNK_MAX));
+                    chunks.push(chunk);
                 }
                 op::DATA_END => {
                     complete = true;
@@ -105,6 +138,11 @@ impl Recording {
                 }
                 _ => {}
             }
+        }
+        let unpacked_max = UNPACKED_MAX.max(length.saturating_mul(UNPACKED_TIMES_MAX));
+        if unpacked > unpacked_max {
+            let (what, count) = ("bytes that it would unpack to", unpacked);
+            return Err(RecordingError::TooMuch { path: path.to_owned(), what, count, limit: unpacked_max });
         }
         let Some(mut manifest) = manifest else {
             return Err(not(
@@ -122,7 +160,8 @@ impl Recording {
             channels: HashMap::new(),
             complete,
         };
-        // Ours have all channels in the first chunk. Should it be damaged, its channels are those that we would have written.
+        // Ours have all channels in the first chunk. Should it be damaged, its channels are those that we
+        // would have written.
         recording.channels =
             (0..recording.manifest.topics.len()).map(|topic| ((topic + 1) as u16, topic)).collect();
         if let Some(first) = recording.chunks.first() {
@@ -159,12 +198,25 @@ impl Recording {
         self.complete
     }
 
-    /// The messages of the wanted topics as they were recorded: each topic's in order, the topics interleaved as they came.
+    /// When its first and its last message were published, in nanoseconds of the board's clock, as the heads
+    /// of its chunks have it; `None` without a chunk. Where it was cut, the second is when.
+    pub fn span_ns(&self) -> Option<(u64, u64)> {
+        // Chunks without a message, as the first is, say nought.
+        let said = || self.chunks.iter().filter(|chunk| chunk.last_stamp_ns > 0);
+        let first = said().map(|chunk| chunk.first_stamp_ns).min();
+        let last = said().map(|chunk| chunk.last_stamp_ns).max();
+        let nothing = (!self.chunks.is_empty()).then_some((0, 0));
+        first.zip(last).map(|(first, last)| (first, last.max(first))).or(nothing)
+    }
+
+    /// The messages of the wanted topics as they were recorded: each topic's in order, the topics interleaved
+    /// as they came.
     pub fn as_recorded(&self, wanted: impl Fn(&Topic) -> bool) -> Messages<'_> {
         self.messages(self.ranks(wanted), false)
     }
 
-    /// The messages of the wanted topics ordered by (stamp, round, topic, sequence). Only chunks that overlap are in memory at once.
+    /// The messages of the wanted topics ordered by (stamp, round, topic, sequence). Only chunks that overlap
+    /// are in memory at once.
     pub fn in_order(&self, wanted: impl Fn(&Topic) -> bool) -> Messages<'_> {
         self.messages(self.ranks(wanted), true)
     }
@@ -187,19 +239,29 @@ impl Recording {
             channels: self.channels.clone(),
             waiting: BinaryHeap::new(),
             queue: VecDeque::new(),
+            ahead: Vec::new(),
             read: 0,
         }
     }
 
+    fn too_much(&self, what: &'static str, count: u64, limit: u64) -> RecordingError {
+        RecordingError::TooMuch { path: self.path.clone(), what, count, limit }
+    }
+
     /// Gives every record of a chunk to `f`.
     fn each_record(&self, chunk: &ChunkPlace, mut f: impl FnMut(u8, &[u8])) -> Result<(), RecordingError> {
+        let packed = chunk.record.end - chunk.record.start;
+        if packed.max(chunk.unpacked) > CHUNK_MAX {
+            let count = packed.max(chunk.unpacked);
+            return Err(self.too_much("bytes of a chunk", count, CHUNK_MAX));
+        }
         let bytes = read_range(&self.file, chunk.record.clone()).map_err(RecordingError::io(&self.path))?;
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
             // Nothing of a damaged chunk is believed.
             .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(RECORD_MAX as usize);
+            .with_record_length_limit(CHUNK_MAX as usize);
         let mut reader = LinearReader::new_with_options(options);
         let mut rest = bytes.as_slice();
         while let Some(event) = reader.next_event() {
@@ -217,7 +279,8 @@ impl Recording {
     }
 }
 
-/// The messages of a recording, one by one. A damaged chunk gives one error, and the next message is that of the next chunk.
+/// The messages of a recording, one by one. A damaged chunk gives one error, and the next message is that of
+/// the next chunk.
 #[derive(Debug)]
 pub struct Messages<'a> {
     recording: &'a Recording,
@@ -229,6 +292,8 @@ pub struct Messages<'a> {
     waiting: BinaryHeap<Reverse<Waiting>>,
     /// Read ahead, as recorded.
     queue: VecDeque<Message>,
+    /// The memory of chunks that were read, as long as messages of theirs are wanted.
+    ahead: Vec<Weak<Vec<u64>>>,
     /// Messages read so far: among equals the one recorded first comes first.
     read: u64,
 }
@@ -274,7 +339,7 @@ impl Iterator for Messages<'_> {
             match self.chunks.front().copied().filter(|_| must_read) {
                 Some(chunk) => {
                     self.chunks.pop_front();
-                    if let Err(error) = self.load(chunk) {
+                    if let Err(error) = self.check_ahead().and_then(|()| self.load(chunk)) {
                         return Some(Err(error));
                     }
                 }
@@ -288,14 +353,44 @@ impl Iterator for Messages<'_> {
 }
 
 impl Messages<'_> {
+    /// Refuses to hold more and more chunks that all claim to be of one time.
+    fn check_ahead(&mut self) -> Result<(), RecordingError> {
+        self.ahead.retain(|memory| memory.strong_count() > 0);
+        let bytes: usize = self.ahead.iter().filter_map(Weak::upgrade).map(|memory| 8 * memory.len()).sum();
+        let messages = self.waiting.len();
+        let found = if bytes > AHEAD_MAX {
+            self.recording.too_much("bytes of chunks that overlap in time", bytes as u64, AHEAD_MAX as u64)
+        } else if messages > AHEAD_MESSAGES_MAX {
+            let limit = AHEAD_MESSAGES_MAX as u64;
+            self.recording.too_much("messages of chunks that overlap in time", messages as u64, limit)
+        } else {
+            return Ok(());
+        };
+        // What was read so far is still given, and nothing after it.
+        self.chunks.clear();
+        Err(found)
+    }
+
     fn load(&mut self, chunk: &ChunkPlace) -> Result<(), RecordingError> {
         let recording = self.recording;
         let mut loaded: Vec<(usize, Envelope, Range<usize>)> = Vec::new();
         let mut arena: Vec<u8> = Vec::new();
         let mut contexts: HashMap<u16, Context> = HashMap::new();
         let mut misfit = None;
+        let mut too_much = None;
         let mut add =
             |channel: u16, channels: &HashMap<u16, usize>, envelope: Envelope, body: &[u8], is_cdr: bool| {
+                // Messages may be larger in memory than on the wire, and chunks hold any number of them.
+                if arena.len() as u64 > CHUNK_MAX || loaded.len() >= CHUNK_MESSAGES_MAX {
+                    let (count, limit) = (loaded.len() as u64, CHUNK_MESSAGES_MAX as u64);
+                    too_much.get_or_insert_with(|| match loaded.len() < CHUNK_MESSAGES_MAX {
+                        true => {
+                            recording.too_much("bytes of a chunk's messages", arena.len() as u64, CHUNK_MAX)
+                        }
+                        false => recording.too_much("messages of a chunk", count, limit),
+                    });
+                    return;
+                }
                 let Some(&topic) = channels.get(&channel) else { return };
                 if self.ranks.get(topic).copied().flatten().is_none() {
                     return;
@@ -342,9 +437,16 @@ impl Messages<'_> {
             }
             _ => {}
         })?;
+        if let Some(too_much) = too_much {
+            return Err(too_much);
+        }
         let mut words = vec![0_u64; arena.len().div_ceil(8)];
         words.as_mut_bytes()[..arena.len()].copy_from_slice(&arena);
+        drop(arena);
         let memory = Arc::new(words);
+        if self.ordered {
+            self.ahead.push(Arc::downgrade(&memory));
+        }
         for (topic, envelope, range) in loaded {
             let message = Message { topic, envelope, memory: Arc::clone(&memory), range };
             self.read += 1;
@@ -388,17 +490,39 @@ fn message_head(body: &mut &[u8]) -> Option<(u16, u32, u64, u64)> {
     ))
 }
 
-/// The record that begins at `at`, if it is whole.
-fn record_at(file: &File, at: u64, length: u64) -> std::io::Result<Option<(u8, Range<u64>)>> {
-    if length.saturating_sub(at) < HEAD {
-        return Ok(None);
+/// Reads the heads of records, many of them at once: most records are short.
+struct Heads<'a> {
+    file: &'a File,
+    length: u64,
+    block: Vec<u8>,
+    /// Where in the file the block begins.
+    begin: u64,
+}
+
+impl<'a> Heads<'a> {
+    const BLOCK: u64 = 64 * 1024;
+
+    fn new(file: &'a File, length: u64) -> Self {
+        Self { file, length, block: Vec::new(), begin: 0 }
     }
-    let mut head = [0; HEAD as usize];
-    file.read_exact_at(&mut head, at)?;
-    let mut rest = &head[1..];
-    let body = take(&mut rest).map_or(0, u64::from_le_bytes);
-    let end = at.saturating_add(HEAD).saturating_add(body);
-    Ok((end <= length && body <= RECORD_MAX).then_some((head[0], at..end)))
+
+    /// The record that begins at `at`, if it is whole.
+    fn record_at(&mut self, at: u64) -> std::io::Result<Option<(u8, Range<u64>)>> {
+        if self.length.saturating_sub(at) < HEAD {
+            return Ok(None);
+        }
+        let is_here = at >= self.begin && at + HEAD <= self.begin + self.block.len() as u64;
+        if !is_here {
+            self.block.resize((self.length - at).min(Self::BLOCK) as usize, 0);
+            self.file.read_exact_at(&mut self.block, at)?;
+            self.begin = at;
+        }
+        let head = &self.block[(at - self.begin) as usize..];
+        let mut rest = &head[1..];
+        let body = take(&mut rest).map_or(0, u64::from_le_bytes);
+        let end = at.saturating_add(HEAD).saturating_add(body);
+        Ok((end <= self.length).then_some((head[0], at..end)))
+    }
 }
 
 fn read_range(file: &File, range: Range<u64>) -> std::io::Result<Vec<u8>> {

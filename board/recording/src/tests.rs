@@ -3,6 +3,8 @@ use messages::{Description, FieldDescription, Kind, Message as _, Time, catalogu
 use proptest::prelude::*;
 use std::time::Duration;
 
+mod limits;
+
 fn manifest(descriptions: Vec<Description>) -> Manifest {
     let topic = |(index, message): (usize, Description)| Topic {
         name: format!("{}/{index}", message.name.to_lowercase()),

@@ -42,6 +42,7 @@ fn main() -> ExitCode {
             ),
             ("a_stamp_from_the_future_does_not_count", ports::a_stamp_from_the_future_does_not_count),
             ("random_bytes_are_survived", ports::random_bytes_are_survived),
+            ("what_a_service_is_needs_no_data", ports::what_a_service_is_needs_no_data),
             ("every_service_publishes_its_health", ports::every_service_publishes_its_health),
             ("bells_wake_across_processes", bells::bells_wake_across_processes),
             ("a_killed_host_is_swept_with_its_services", teardown::a_killed_host_is_swept_with_its_services),

@@ -192,3 +192,28 @@ pub(crate) fn every_service_publishes_its_health() {
     drop((reader, tap));
     robot.take_down();
 }
+
+pub(crate) fn what_a_service_is_needs_no_data() {
+    let ask = |parameters: &str| {
+        let mut command = std::process::Command::new(std::env::current_exe().unwrap());
+        command.env(crate::services::WHICH, "laden").args(["--interface", "--params", parameters]);
+        command.output().unwrap()
+    };
+    // Its map would break the start, and is not looked at.
+    let answer = ask(r#"{"period_us": 60}"#);
+    assert!(answer.status.success(), "{}", String::from_utf8_lossy(&answer.stderr));
+    let interface: board::Interface = serde_json::from_slice(&answer.stdout).unwrap();
+    assert_eq!((interface.ports.len(), interface.period_ns), (1, Some(60_000)));
+    // What is wrong before the ports are declared is still refused.
+    let answer = ask(r#"{"period_us": 0}"#);
+    assert_eq!(answer.status.code(), Some(i32::from(board::EXIT_SETUP)));
+    assert!(String::from_utf8_lossy(&answer.stderr).contains("period_us = 0"));
+    // On a board the map is read.
+    let mut robot = Robot::new(&[("count", "laden")]);
+    robot.start_with("laden", r#"{"period_us": 1100}"#);
+    let tap = robot.tap();
+    let mut count = tap.reader("count").unwrap();
+    assert_eq!(await_message::<Count>(&tap, &mut count, |_, _| true).number, 1000);
+    drop((count, tap));
+    robot.take_down();
+}

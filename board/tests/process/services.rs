@@ -131,6 +131,17 @@ pub(crate) fn serve(which: &str) -> ExitCode {
         }),
         "gullible" => run(service("gullible"), gullible),
         "many-ports" => run(service("many-ports"), many_ports),
+        "laden" => run(service("laden"), |node, params: Params| {
+            let mut count = node.publisher::<Count>("count")?;
+            if params.period_us == 0 {
+                return Err("period_us = 0 is no period".into());
+            }
+            node.every(Duration::from_micros(params.period_us));
+            node.declared()?;
+            // Stands for a map that takes its time.
+            let number = params.period_us.checked_sub(100).ok_or("the map is broken")?;
+            Ok(move |_| count.publish(&Count { number, twice: 2 * number }))
+        }),
         _ => ExitCode::FAILURE,
     }
 }

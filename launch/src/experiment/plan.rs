@@ -2,12 +2,16 @@
 
 use crate::graph::Overrides;
 use serde::Deserialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// More runs than this are a slip in the file.
 const RUNS_MAX: usize = 100_000;
+/// The largest experiment of ours has 3 KiB.
+const FILE_MAX: u64 = 1 << 20;
+/// What the runs of an experiment change, in bytes, all together.
+const CHANGES_MAX: usize = 256 << 20;
 
 /// Why an experiment file is refused.
 #[derive(Debug, thiserror::Error)]
@@ -17,8 +21,8 @@ pub(super) enum PlanError {
     Unreadable {
         /// The file.
         file: String,
-        /// What the operating system said.
-        cause: std::io::Error,
+        /// Why.
+        cause: files::FileProblem,
     },
     /// The file is no experiment.
     #[error("{file}: {cause}")]
@@ -74,6 +78,11 @@ pub(super) enum PlanError {
         /// The limit.
         limit_s: f64,
     },
+    /// So many changes in so many runs that they do not fit into memory.
+    #[error(
+        "its runs change more than can be kept in mind: vary fewer parameters, or name long values in the graph"
+    )]
+    TooMuch,
     /// No seeds, or far too much to do.
     #[error(
         "this makes {runs} runs; between 1 and {RUNS_MAX} are possible: change the seeds or what is varied"
@@ -210,6 +219,12 @@ impl Changes {
         }
     }
 
+    /// How much they take in memory, about.
+    fn bytes(&self) -> usize {
+        let texts = [&self.labels, &self.set, &self.swap, &self.without];
+        texts.into_iter().flatten().map(|text| text.len() + size_of::<String>()).sum()
+    }
+
     fn of_tables(set: &Table, swap: &Table, without: &[String]) -> Result<Self, PlanError> {
         let mut changes = Self { without: without.to_vec(), ..Self::default() };
         for (key, value) in set {
@@ -256,8 +271,8 @@ fn swapped(role: &str, binary: &Value) -> Result<String, PlanError> {
 /// Names what is wrong with it.
 pub(super) fn read(file: &Path) -> Result<Plan, PlanError> {
     let shown = file.display().to_string();
-    let text = std::fs::read_to_string(file)
-        .map_err(|cause| PlanError::Unreadable { file: shown.clone(), cause })?;
+    let text = files::read_text(file, FILE_MAX)
+        .map_err(|error| PlanError::Unreadable { file: shown.clone(), cause: error.problem })?;
     let stem = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or("experiment");
     parse(&text, stem, file.parent().unwrap_or(Path::new(""))).map_err(|error| match error {
         PlanError::Malformed { cause, .. } => PlanError::Malformed { file: shown, cause },
@@ -292,6 +307,7 @@ pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanE
     }
     let mut variants: Vec<Variant> = Vec::new();
     let mut runs = Vec::new();
+    let (mut names, mut bytes) = (BTreeSet::new(), 0_usize);
     for table in &file.variant {
         let own = Changes::of_tables(&table.set, &table.swap, &table.without)?;
         let limit_s = table.limit_s.unwrap_or(file.limit_s);
@@ -306,13 +322,17 @@ pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanE
         }
         for combination in &combinations {
             let name = variant_name(&table.name, &file.vary, &combination.labels);
-            if variants.iter().any(|known| known.name == name) {
+            if !names.insert(name.clone()) {
                 return Err(PlanError::SameName { name });
             }
             variants.push(Variant { name, expect: table.expect.clone() });
             let changes = for_all.and(&own).and(combination);
             for situation in &situations {
                 let changes = changes.and(situation);
+                bytes = bytes.saturating_add(changes.bytes().saturating_mul(seeds.len()));
+                if bytes > CHANGES_MAX {
+                    return Err(PlanError::TooMuch);
+                }
                 runs.extend(seeds.iter().map(|&seed| Run {
                     variant: variants.len() - 1,
                     situation: situation.labels.clone(),
@@ -360,6 +380,10 @@ fn product(axes: &Table) -> Result<Vec<Changes>, PlanError> {
         };
         if values.is_empty() {
             return Err(PlanError::EmptyList { key: key.clone() });
+        }
+        let runs = combinations.len().saturating_mul(values.len());
+        if runs > RUNS_MAX {
+            return Err(PlanError::Size { runs });
         }
         let values = values.iter().map(|value| Changes::of_axis(key, value));
         let values = values.collect::<Result<Vec<_>, _>>()?;

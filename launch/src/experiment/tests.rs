@@ -54,6 +54,15 @@ fn wrong_plans_are_refused() {
     check_refused("[[variant]]\nname = 'x'\nlimit_s = 0", "limit_s = 0 is not above zero");
     check_refused("[[variant]]\nname = 'x'\nlimit_s = nan", "limit_s = NaN is not above zero");
     check_refused("[[variant]]\nname = 'x'\nseeds = []", "this makes 0 runs");
+    // Refused before they are spelt out.
+    let axes: String = (0..40).map(|n| format!("'guard.p{n}' = [1, 2, 3, 4, 5, 6, 7, 8, 9]\n")).collect();
+    check_refused(&format!("[vary]\n{axes}"), "this makes 531441 runs; between 1 and 100000 are possible");
+    let long = "x".repeat(20_000);
+    let many = (0..20_000).map(|n| n.to_string()).collect::<Vec<_>>().join(", ");
+    check_refused(
+        &format!("[set]\n'guard.text' = '{long}'\n[vary]\n'guard.p' = [{many}]"),
+        "more than can be kept in mind",
+    );
     check_refused(
         "[[variant]]\nname = 'x'\nseeds = { from = 0, count = 99999999999 }",
         "between 1 and 100000",
@@ -320,4 +329,20 @@ fn ratios_are_of_sums_over_the_runs_that_have_both() {
     assert_eq!(verdicts.iter().map(|verdict| verdict.found).collect::<Vec<_>>(), [Some(1.2), None]);
     let tables = report::tables(&plan, &records, false);
     assert!(tables.contains("path / shortest") && tables.contains("1.200"), "{tables}");
+}
+
+#[test]
+fn only_plain_text_of_some_size_is_an_experiment() {
+    let told = |path: &Path, words: &str| {
+        let error = plan::read(path).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    let folder = tempfile::tempdir().unwrap();
+    told(Path::new("/dev/zero"), "this is a device");
+    told(folder.path(), "this is a folder");
+    let file = folder.path().join("x.toml");
+    fs::write(&file, vec![b'#'; 2 << 20]).unwrap();
+    told(&file, "it has 2 MiB, more than 1 MiB");
+    fs::write(&file, b"name = 'caf\xe9'").unwrap();
+    told(&file, "line 1, byte 12: the byte 0xe9 is no UTF-8");
 }

@@ -1,22 +1,14 @@
 //! Where the binaries of services are, and what they say of themselves.
 
+use super::ask::{self, PATIENCE, Spent};
 use super::check::{Binaries, NotFound, QueryError};
 use super::find::checkout;
 use board::Interface;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::process::{Pid, PidfdFlags, Signal, kill_process_group, pidfd_open};
 use serde_json::Value;
 use std::collections::HashMap;
-use std::io::Read;
 use std::os::unix::fs::PermissionsExt as _;
-use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-
-/// How long a binary may take to say what it is.
-const ANSWER_WITHIN_S: i64 = 2;
-/// Longest answer, in bytes.
-const ANSWER_MAX: u64 = 16 << 20;
+use std::process::Command;
 
 /// The binaries on this machine.
 #[derive(Debug, Clone)]
@@ -54,7 +46,9 @@ impl Binaries for Installed {
         if let Some(parameters) = parameters {
             command.arg("--params").arg(parameters.to_string());
         }
-        let output = run_for_a_while(&mut command)?;
+        let output = ask::run(&mut command, PATIENCE, |spent| {
+            tell_slow(binary, largest_file(&self.folder, parameters), spent);
+        })?;
         let complaint = String::from_utf8_lossy(&output.stderr);
         let complaint = complaint.lines().find(|line| !line.trim().is_empty()).unwrap_or("it says nothing");
         let complaint = complaint.strip_prefix("error: ").unwrap_or(complaint).to_owned();
@@ -122,56 +116,29 @@ fn is_executable(path: &Path) -> bool {
     path.metadata().is_ok_and(|found| found.is_file() && found.permissions().mode() & 0o111 != 0)
 }
 
-/// Runs a command to its end, or until its time is up.
-fn run_for_a_while(command: &mut Command) -> Result<Output, QueryError> {
-    let broken = |what: &str, error: std::io::Error| {
-        let lack = board::Lack::behind(&error).map(|lack| format!(" ({lack})")).unwrap_or_default();
-        QueryError::Broken(format!("{what}: {error}{lack}"))
+/// The largest of the files that parameters name: what a service that takes long is most likely busy with.
+fn largest_file<'a>(folder: &Path, parameters: Option<&'a Value>) -> Option<&'a str> {
+    let texts = parameters.and_then(Value::as_object)?.values().filter_map(Value::as_str);
+    let size = |text: &str| {
+        folder.join(text).metadata().ok().filter(|found| found.is_file()).map(|found| found.len())
     };
-    // A group of its own, so that whatever it started ends with it.
-    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
-    let mut child = command.spawn().map_err(|error| broken("it cannot be started", error))?;
-    let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
-    let in_time = std::thread::scope(|scope| {
-        let stdout = scope.spawn(|| read_all(stdout));
-        let stderr = scope.spawn(|| read_all(stderr));
-        let in_time = wait_for_exit(&child);
-        if !in_time {
-            end_group(&child);
+    let files = texts.filter(|text| !text.is_empty()).filter_map(|text| Some((size(text)?, text)));
+    files.max().map(|(_, text)| text)
+}
+
+/// Says that a binary is slow, and why it may be.
+fn tell_slow(binary: &Path, file: Option<&str>, spent: Spent) {
+    let name = binary.file_name().unwrap_or_default().to_string_lossy();
+    let (wall, used) = (spent.wall.as_secs_f64(), spent.processor.as_secs_f64());
+    // Who works uses the processor at least half of the time.
+    let words = match file {
+        _ if used < 0.5 * wall => {
+            format!(
+                "`{name}` has not answered for {wall:.0} s ({used:.1} s of processor time): the machine is busy, or it waits"
+            )
         }
-        (in_time, stdout.join().unwrap_or_default(), stderr.join().unwrap_or_default())
-    });
-    let (in_time, stdout, stderr) = in_time;
-    let status = child.wait().map_err(|error| broken("it cannot be waited for", error))?;
-    if !in_time {
-        return Err(QueryError::Broken(format!("no answer within {ANSWER_WITHIN_S} s")));
-    }
-    Ok(Output { status, stdout, stderr })
-}
-
-fn read_all(pipe: Option<impl Read>) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    if let Some(pipe) = pipe {
-        // What arrived before an error is still worth showing.
-        let _ = pipe.take(ANSWER_MAX).read_to_end(&mut bytes);
-    }
-    bytes
-}
-
-fn pid_of(child: &Child) -> Option<Pid> {
-    Pid::from_raw(i32::try_from(child.id()).ok()?)
-}
-
-fn wait_for_exit(child: &Child) -> bool {
-    let Some(Ok(pidfd)) = pid_of(child).map(|pid| pidfd_open(pid, PidfdFlags::empty())) else { return false };
-    let limit = Timespec { tv_sec: ANSWER_WITHIN_S, tv_nsec: 0 };
-    let mut fds = [PollFd::new(&pidfd, PollFlags::IN)];
-    poll(&mut fds, Some(&limit)).is_ok_and(|ready| ready > 0)
-}
-
-fn end_group(child: &Child) {
-    if let Some(pid) = pid_of(child) {
-        // It may have left in this very moment.
-        let _ = kill_process_group(pid, Signal::KILL);
-    }
+        Some(file) => format!("`{name}` is still reading {file} ({used:.1} s of processor time)"),
+        None => format!("`{name}` is still working at its answer ({used:.1} s of processor time)"),
+    };
+    crate::console::warn(&words);
 }

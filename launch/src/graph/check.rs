@@ -2,17 +2,22 @@
 
 use super::faults::Fault;
 use super::file::Overrides;
+use super::paths;
 use super::problem::{Problem, Problems};
 use super::schema::Schema;
 use super::settings::{Graph, LaunchSettings, ServiceTable, ViewSettings};
 use super::suggest::{nearest, quoted};
+use super::text::to_toml;
 use super::topics::{Member, connect};
 use super::tree::{Content, Entry, Node};
+use board::switchboard::TOPICS;
 use board::{Direction, Interface};
 use messages::Description;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// Where binaries are, and what they say of themselves. Asked from several threads.
 pub(crate) trait Binaries: Sync {
@@ -147,8 +152,32 @@ pub(crate) struct Reader {
     pub(crate) wakes: bool,
 }
 
-/// Compares the graph with its binaries, on a machine with `cpus` processors. What is wrong goes to `problems`; the result is there if nothing
-/// refuses the graph, also nothing that was in `problems` before.
+/// Which parameters name files, by role.
+#[derive(Debug, Clone, Default)]
+pub(super) struct CheckedPaths(Vec<(String, Vec<String>)>);
+
+impl CheckedPaths {
+    /// Those of a role.
+    pub(super) fn of_role<'a>(&'a self, role: &'a str) -> impl Iterator<Item = &'a str> {
+        let roles = self.0.iter().filter(move |(known, _)| known == role);
+        roles.flat_map(|(_, keys)| keys.iter().map(String::as_str))
+    }
+
+    /// Those of any role.
+    pub(super) fn all(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().flat_map(|(_, keys)| keys.iter().map(String::as_str))
+    }
+
+    fn add(&mut self, role: &str, schema: &Value) {
+        let properties = schema.get("properties").and_then(Value::as_object);
+        let keys = properties.into_iter().flat_map(|properties| properties.keys());
+        let keys = keys.filter(|key| paths::is_path(schema, key)).cloned().collect();
+        self.0.push((role.to_owned(), keys));
+    }
+}
+
+/// Compares the graph with its binaries, on a machine with `cpus` processors. What is wrong goes to
+/// `problems`; the result is there if nothing refuses the graph, also nothing that was in `problems` before.
 pub(crate) fn check(
     graph: &Graph,
     binaries: &dyn Binaries,
@@ -160,13 +189,15 @@ pub(crate) fn check(
     }
     let asked = in_parallel(&graph.services, |service| ask_for_defaults(service, binaries));
     let mut members = Vec::new();
+    let mut paths = CheckedPaths::default();
     let mut used_defaults = vec![false; graph.defaults.len()];
     for (service, answer) in graph.services.iter().zip(asked) {
         match answer {
             Ok((binary, defaults)) => {
                 let mut found = Problems::default();
+                paths.add(&service.role, &defaults.parameters);
                 let given = choose_parameters(graph, service, &defaults, &mut used_defaults, &mut found);
-                let settled = !found.refuse();
+                let settled = !found.refuse() && !given.iter().any(|entry| entry.value.has_nonsense());
                 problems.extend(found);
                 members.push(Asked { service, binary, interface: defaults, given, settled });
             }
@@ -188,9 +219,18 @@ pub(crate) fn check(
     let ports: Vec<_> =
         members.iter().map(|member| Member { table: member.service, interface: &member.interface }).collect();
     let topics = connect(graph, &ports, complete, problems);
+    // Each service has its health on the board.
+    let on_board = topics.len() + members.len();
+    if on_board > TOPICS {
+        let message =
+            format!("{on_board} topics, with the services' health, are more than the {TOPICS} of a board");
+        problems.push(Problem::placeless(message, "leave out services, or run them on two boards"));
+    }
     if problems.refuse() {
         return None;
     }
+    let mut written = graph.written.clone();
+    paths::rebase_all(&mut written, &paths, &graph.folder);
     let services = members.into_iter().map(|member| CheckedService {
         role: member.service.role.clone(),
         run: member.service.run.clone(),
@@ -209,7 +249,7 @@ pub(crate) fn check(
         services: services.collect(),
         topics,
         faults: graph.faults.clone(),
-        text: graph.text.clone(),
+        text: to_toml(&written),
         overrides: Overrides::default(),
     })
 }
@@ -224,14 +264,32 @@ struct Asked<'a> {
     settled: bool,
 }
 
+/// How many binaries are asked at once: more only wait for each other.
+const AT_ONCE: usize = 16;
+
+/// Asks for all items, several at once; here and one after the other when no thread can be started.
 fn in_parallel<T: Sync, R: Send>(items: &[T], ask: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let next = AtomicUsize::new(0);
+    let answers: Mutex<Vec<(usize, R)>> = Mutex::new(Vec::new());
+    let work = || {
+        while let index = next.fetch_add(1, Ordering::Relaxed)
+            && let Some(item) = items.get(index)
+        {
+            let answer = ask(item);
+            answers.lock().unwrap_or_else(PoisonError::into_inner).push((index, answer));
+        }
+    };
     std::thread::scope(|scope| {
-        let threads: Vec<_> = items.iter().map(|item| scope.spawn(|| ask(item))).collect();
-        let join = |thread: std::thread::ScopedJoinHandle<'_, R>| {
-            thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        };
-        threads.into_iter().map(join).collect()
-    })
+        for _ in 1..items.len().min(AT_ONCE) {
+            if std::thread::Builder::new().spawn_scoped(scope, work).is_err() {
+                break;
+            }
+        }
+        work();
+    });
+    let mut answers = answers.into_inner().unwrap_or_else(PoisonError::into_inner);
+    answers.sort_by_key(|(index, _)| *index);
+    answers.into_iter().map(|(_, answer)| answer).collect()
 }
 
 fn check_machine(service: &ServiceTable, cpus: usize, problems: &mut Problems) {
@@ -296,14 +354,14 @@ fn choose_parameters(
         }
         let entry = unquoted_text(entry, interface);
         schema.check(&entry, problems);
-        given.push(entry);
+        given.push(located(&entry, graph, interface));
     }
     for (entry, used) in graph.defaults.iter().zip(used_defaults) {
         if schema.has(&entry.key) {
             *used = true;
             if !given.iter().any(|own| own.key == entry.key) {
                 schema.check(entry, problems);
-                given.push(entry.clone());
+                given.push(located(entry, graph, interface));
             }
         }
     }
@@ -322,6 +380,15 @@ fn unquoted_text(entry: &Entry, interface: &Interface) -> Entry {
     Entry { value: Node { content, place }, ..entry.clone() }
 }
 
+/// A path, from the graph's folder on.
+fn located(entry: &Entry, graph: &Graph, interface: &Interface) -> Entry {
+    let mut entry = entry.clone();
+    if paths::is_path(&interface.parameters, &entry.key) {
+        paths::rebase(&mut entry, &graph.folder);
+    }
+    entry
+}
+
 fn refuse_unused_defaults(graph: &Graph, used: &[bool], members: &[Asked<'_>], problems: &mut Problems) {
     for (entry, _) in graph.defaults.iter().zip(used).filter(|(_, used)| !**used) {
         let names: Vec<&str> = members
@@ -338,7 +405,8 @@ fn refuse_unused_defaults(graph: &Graph, used: &[bool], members: &[Asked<'_>], p
     }
 }
 
-/// Asks again when there is something to ask: whether the parameters make sense together, and which ports they lead to.
+/// Asks again when there is something to ask: whether the parameters make sense together, and which ports
+/// they lead to.
 fn ask_with_parameters(
     graph: &Graph,
     member: &Asked<'_>,
@@ -363,7 +431,7 @@ fn ask_with_parameters(
             let message = format!("`{role}` refuses its parameters: {why}");
             let given = quoted(member.given.iter().map(|entry| entry.key.as_str()));
             let help = format!("change what it names; this graph gives it {given}");
-            let folder = graph.folder.display();
+            let folder = place.source().folder.as_deref().unwrap_or(&graph.folder).display();
             let help = if why.contains("No such file") {
                 format!("{help}; files count from {folder}")
             } else {

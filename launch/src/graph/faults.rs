@@ -53,30 +53,55 @@ pub(super) fn read_faults(entry: &Entry, roles: &[&str], problems: &mut Problems
     faults
 }
 
+/// `None` when something is wrong with it: all of it is told.
 fn read_fault(node: &Node, table: &Table, roles: &[&str], problems: &mut Problems) -> Option<Fault> {
     const KEYS: [&str; 5] = ["at_s", "kill", "stop", "for_s", "down_s"];
     let unknown: Vec<&Entry> =
         table.entries.iter().filter(|entry| !KEYS.contains(&entry.key.as_str())).collect();
     unknown.iter().for_each(|entry| refuse_key(entry, "a fault", &KEYS, problems));
-    let refused = |message: &str, problems: &mut Problems| {
+    let mut refused = |message: &str| {
         problems.push(Problem::error(&node.place, message, format!("write {FORM}")));
-        None
     };
-    let Some(at) = table.get("at_s") else {
-        return refused("a fault lacks `at_s`, its logical moment", problems);
-    };
-    let at = seconds(at, problems)?;
+    let at = table.get("at_s");
+    if at.is_none() {
+        refused("a fault lacks `at_s`, its logical moment");
+    }
     let (kill, stop) = (table.get("kill"), table.get("stop"));
-    let ((Some(victim), None) | (None, Some(victim))) = (kill, stop) else {
-        return refused("a fault has either `kill` or `stop`", problems);
+    if kill.is_some() == stop.is_some() {
+        refused("a fault has either `kill` or `stop`");
+    }
+    let at = at.and_then(|at| seconds(at, problems));
+    let roles: Vec<Option<&str>> =
+        [kill, stop].into_iter().flatten().map(|victim| role_of(victim, roles, problems)).collect();
+    let mut span = |key: &str| table.get(key).map(|entry| (entry, seconds(entry, problems)));
+    let (lasting, down) = (span("for_s"), span("down_s"));
+    let odd = match (kill, stop) {
+        (Some(victim), None) => lasting.as_ref().map(|(odd, _)| (*odd, victim)),
+        (None, Some(victim)) => down.as_ref().map(|(odd, _)| (*odd, victim)),
+        _ => None,
     };
-    let odd = if kill.is_some() { table.get("for_s") } else { table.get("down_s") };
-    if let Some(odd) = odd {
+    if let Some((odd, victim)) = odd {
         let message = format!("`{}` means nothing to `{}`", odd.key, victim.key);
         let help = "`for_s` says how long a stopped service hangs, `down_s` when the successor of a killed one takes its first step";
         problems.push(Problem::error(&odd.key_place, message, help));
-        return None;
     }
+    let ([Some(role)], Some(at), None, true) = (roles.as_slice(), at, odd, unknown.is_empty()) else {
+        return None;
+    };
+    // A span that was given and is wrong was told.
+    let whole = |span: Option<(&Entry, Option<Duration>)>| match span {
+        Some((_, span)) => span.map(Some),
+        None => Some(None),
+    };
+    let kind = match kill {
+        Some(_) => FaultKind::Kill { down: whole(down)? },
+        None => FaultKind::Stop { lasting: whole(lasting)? },
+    };
+    Some(Fault { at, role: (*role).to_owned(), kind })
+}
+
+/// The service that a fault strikes.
+fn role_of<'a>(victim: &'a Entry, roles: &[&str], problems: &mut Problems) -> Option<&'a str> {
     let role = take(victim.value.text(), victim, "the name of a service", problems)?;
     if !roles.contains(&role) {
         let message = format!("the graph has no service `{role}`");
@@ -84,15 +109,7 @@ fn read_fault(node: &Node, table: &Table, roles: &[&str], problems: &mut Problem
         problems.push(Problem::error(&victim.value.place, message, help));
         return None;
     }
-    let span = |key: &str, problems: &mut Problems| match table.get(key) {
-        Some(entry) => seconds(entry, problems).map(Some),
-        None => Some(None),
-    };
-    let kind = match kill {
-        Some(_) => FaultKind::Kill { down: span("down_s", problems)? },
-        None => FaultKind::Stop { lasting: span("for_s", problems)? },
-    };
-    unknown.is_empty().then(|| Fault { at, role: role.to_owned(), kind })
+    Some(role)
 }
 
 fn seconds(entry: &Entry, problems: &mut Problems) -> Option<Duration> {

@@ -1,11 +1,12 @@
 //! From a file's name to one table: includes, and what the command line changes.
 
+use super::find::find_included;
 use super::problem::{Problem, Problems};
 use super::settings::{Graph, read_graph};
 use super::source::{Place, Source};
 use super::suggest::hint;
-use super::text::to_toml;
 use super::tree::{Content, Entry, Node, Table, parse, parse_value};
+use files::{FileError, FileProblem};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,18 +26,33 @@ pub(crate) struct Overrides {
     pub(crate) board: Option<String>,
 }
 
+/// The largest graph of ours has 3 KiB; one of as many services as a board has room for, each with a hundred
+/// parameters, has 400.
+const FILE_MAX: u64 = 1 << 20;
+/// Files that include each other in a row, and files in all: no graph is made of more parts.
+const INCLUDES_DEEP: usize = 16;
+const INCLUDES_MAX: usize = 100;
+
 /// Reads a graph file with everything it includes. What is wrong goes to `problems`; the graph is there
 /// unless the mistakes leave nothing to look at.
 pub(crate) fn load(path: &Path, overrides: &Overrides, problems: &mut Problems) -> Option<Graph> {
-    let text = match std::fs::read_to_string(path) {
+    let text = match files::read_text(path, FILE_MAX) {
         Ok(text) => text,
-        Err(error) => {
-            let message = format!("cannot read the graph file {}: {error}", shown(path));
-            problems.push(Problem::placeless(message, "name a graph file that exists"));
+        Err(FileError { problem, .. }) => {
+            let message = format!("cannot read the graph file {}: {problem}", shown(path));
+            problems.push(Problem::placeless(message, what_to_do(&problem)));
             return None;
         }
     };
     read(path, &Source::file(shown(path), text), overrides, problems)
+}
+
+fn what_to_do(problem: &FileProblem) -> &'static str {
+    match problem {
+        FileProblem::NotText { .. } => "correct that byte, or save the file as UTF-8",
+        FileProblem::Io(error) if error.kind() != std::io::ErrorKind::NotFound => "see that it can be read",
+        _ => "name a graph file that exists",
+    }
 }
 
 /// The same of a text that was kept; `path` is where the file was, from which other files count.
@@ -60,10 +76,10 @@ fn read(path: &Path, source: &Arc<Source>, overrides: &Overrides, problems: &mut
         problems.push(Problem::error(&Place::top(source), "this graph has no services", help));
         return None;
     }
-    let text = to_toml(&table);
+    let written = table.clone();
     apply(overrides, &mut table, problems);
     let graph = read_graph(path, source, &table, problems)?;
-    Some(Graph { text, ..graph })
+    Some(Graph { written, ..graph })
 }
 
 /// A path as people would type it: relative to the current folder if it lies within.
@@ -71,7 +87,8 @@ pub(crate) fn shown(path: &Path) -> String {
     let inside =
         std::env::current_dir().ok().and_then(|here| path.strip_prefix(here).ok().map(Path::to_owned));
     let path = inside.unwrap_or_else(|| path.to_owned());
-    path.strip_prefix(".").unwrap_or(&path).display().to_string()
+    let path = path.strip_prefix(".").unwrap_or(&path);
+    if path.as_os_str().is_empty() { ".".to_owned() } else { path.display().to_string() }
 }
 
 struct Reader<'a> {
@@ -121,8 +138,8 @@ impl Reader<'_> {
                 Some(text) => files.push((text.to_owned(), item.place.clone())),
                 None => self.problems.push(Problem::error(
                     &item.place,
-                    format!("`include` takes names of files, not {}", item.kind()),
-                    "write include = [\"parts/tof.toml\"]",
+                    format!("`include` takes graphs by name and files, not {}", item.kind()),
+                    "write include = [\"coffee\"], or [\"parts/tof.toml\"]",
                 )),
             }
         }
@@ -130,7 +147,14 @@ impl Reader<'_> {
     }
 
     fn read_include(&mut self, including: &Path, (name, place): &(String, Place)) -> Option<Table> {
-        let path = including.parent().unwrap_or(Path::new("")).join(name);
+        let folder = including.parent().unwrap_or(Path::new(""));
+        let path = match find_included(name, folder) {
+            Ok(path) => path,
+            Err(unknown) => {
+                self.problems.push(Problem::error(place, unknown.to_string(), unknown.help()));
+                return None;
+            }
+        };
         let identity = path.canonicalize().unwrap_or_else(|_| path.clone());
         if let Some(start) = self.open.iter().position(|(open, _)| *open == identity) {
             let chain: Vec<_> = self.open[start..].iter().map(|(_, name)| name.as_str()).collect();
@@ -141,11 +165,25 @@ impl Reader<'_> {
         if self.done.contains(&identity) {
             return None;
         }
-        match std::fs::read_to_string(&path) {
-            Ok(text) => self.read(&path, &Source::file(shown(&path), text)),
-            Err(error) => {
-                let message = format!("cannot read the included file {}: {error}", shown(&path));
-                let help = "the name counts from the folder of this file";
+        if self.open.len() >= INCLUDES_DEEP || self.done.len() >= INCLUDES_MAX {
+            let message = format!(
+                "more than {INCLUDES_DEEP} files include each other in a row, or {INCLUDES_MAX} are included in all"
+            );
+            self.problems.push(Problem::error(place, message, "put some of them together"));
+            return None;
+        }
+        match files::read_text(&path, FILE_MAX) {
+            Ok(text) => {
+                let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+                let folder = folder.unwrap_or(Path::new("."));
+                self.read(&path, &Source::included(shown(&path), text, folder))
+            }
+            Err(FileError { problem, .. }) => {
+                let message = format!("cannot read the included file {}: {problem}", shown(&path));
+                let help = match problem {
+                    FileProblem::NotText { .. } => what_to_do(&problem),
+                    _ => "the name counts from the folder of this file",
+                };
                 self.problems.push(Problem::error(place, message, help));
                 None
             }
@@ -219,26 +257,27 @@ fn apply(overrides: &Overrides, table: &mut Table, problems: &mut Problems) {
     for swap in &overrides.swap {
         let source = Source::argument("--swap", swap);
         let Some(change) = split(&source, "--swap", "role=binary", problems) else { continue };
-        if !find_service(table, &change.path, &change.path_place, problems) {
+        let role = Key { name: change.path.clone(), place: change.path_place.clone() };
+        if !find_service(table, &role.name, &role.place, problems) {
             continue;
         }
         let place = Place::new(&source, change.value_offset..source.text.len());
         let content = Content::Text(place.text().to_owned());
-        let value = Node { content, place: place.clone() };
-        put_at(table, &[&change.path, "run"], &change.path_place, value);
+        let run = Key { name: "run".to_owned(), place: role.place.clone() };
+        put_at(table, &[role, run], Node { content, place });
     }
     for set in &overrides.set {
         let source = Source::argument("--set", set);
         let Some(change) = split(&source, "--set", "role.parameter=value", problems) else { continue };
-        let keys: Vec<&str> = change.path.split('.').map(str::trim).collect();
+        let keys = keys_of(&change, &source);
         let [role, rest @ ..] = keys.as_slice() else { continue };
-        if rest.is_empty() || keys.iter().any(|key| key.is_empty()) {
+        if rest.is_empty() || keys.iter().any(|key| key.name.is_empty()) {
             let message = format!("`{}` names no parameter", change.path);
-            let help = format!("write --set {role}.parameter=value");
+            let help = format!("write --set {}.parameter=value", role.name);
             problems.push(Problem::error(&change.path_place, message, help));
-        } else if *role == "graph" || find_service(table, role, &change.path_place, problems) {
+        } else if role.name == "graph" || find_service(table, &role.name, &role.place, problems) {
             let value = parse_value(&source, change.value_offset, problems);
-            put_at(table, &keys, &change.path_place, value);
+            put_at(table, &keys, value);
         }
     }
     let values = [
@@ -249,8 +288,29 @@ fn apply(overrides: &Overrides, table: &mut Table, problems: &mut Problems) {
         let Some((text, content)) = value else { continue };
         let source = Source::argument(option, &text);
         let place = Place::new(&source, option.len() + 1..source.text.len());
-        put_at(table, &["graph", key], &place, Node { content, place: place.clone() });
+        let keys = ["graph", key].map(|name| Key { name: name.to_owned(), place: place.clone() });
+        put_at(table, &keys, Node { content, place });
     }
+}
+
+/// A key, and where it stands.
+struct Key {
+    name: String,
+    place: Place,
+}
+
+/// The keys of a dotted path, each with its own place.
+fn keys_of(change: &Change, source: &Arc<Source>) -> Vec<Key> {
+    let text = change.path_place.text();
+    let mut start = change.path_place.start();
+    let mut keys = Vec::new();
+    for piece in text.split('.') {
+        let name = piece.trim();
+        let begin = start + (piece.len() - piece.trim_start().len());
+        keys.push(Key { name: name.to_owned(), place: Place::new(source, begin..begin + name.len()) });
+        start += piece.len() + 1;
+    }
+    keys
 }
 
 struct Change {
@@ -282,18 +342,19 @@ fn find_service(table: &Table, role: &str, place: &Place, problems: &mut Problem
     false
 }
 
-fn put_at(table: &mut Table, keys: &[&str], key_place: &Place, value: Node) {
+fn put_at(table: &mut Table, keys: &[Key], value: Node) {
     let [key, rest @ ..] = keys else { return };
+    let entry = |value| Entry { key: key.name.clone(), key_place: key.place.clone(), value };
     if rest.is_empty() {
-        table.put(Entry { key: (*key).to_owned(), key_place: key_place.clone(), value });
+        table.put(entry(value));
         return;
     }
-    if table.get(key).is_none_or(|entry| entry.value.table().is_none()) {
-        let empty = Node { content: Content::Table(Table::default()), place: key_place.clone() };
-        table.put(Entry { key: (*key).to_owned(), key_place: key_place.clone(), value: empty });
+    if table.get(&key.name).is_none_or(|entry| entry.value.table().is_none()) {
+        let empty = Node { content: Content::Table(Table::default()), place: key.place.clone() };
+        table.put(entry(empty));
     }
-    let inner = table.entries.iter_mut().find(|entry| entry.key == *key);
+    let inner = table.entries.iter_mut().find(|entry| entry.key == key.name);
     if let Some(Entry { value: Node { content: Content::Table(inner), .. }, .. }) = inner {
-        put_at(inner, rest, key_place, value);
+        put_at(inner, rest, value);
     }
 }

@@ -19,6 +19,12 @@ pub(crate) struct UnknownGraph {
 impl UnknownGraph {
     /// What to do.
     pub(crate) fn help(&self) -> String {
+        if Path::new(&self.name).exists() {
+            let name = &self.name;
+            return format!(
+                "a graph file ends in .toml; to try the file of that name all the same, write ./{name}"
+            );
+        }
         let looked: Vec<_> = self.looked.iter().map(|folder| shown(folder)).collect();
         let looked = format!("looked in {}", looked.join(", "));
         if let Some(name) = nearest(&self.name, self.known.iter().map(String::as_str)) {
@@ -33,10 +39,21 @@ impl UnknownGraph {
 
 /// The file of a graph: a path if it has a slash or ends in `.toml`, else a name.
 pub(crate) fn find(graph: &str) -> Result<PathBuf, UnknownGraph> {
-    if graph.contains('/') || graph.ends_with(".toml") {
-        return Ok(PathBuf::from(graph));
-    }
-    let folders = folders();
+    if is_path(graph) { Ok(PathBuf::from(graph)) } else { find_by_name(graph, None) }
+}
+
+/// The file that another one includes: a path counts from the folder of that one, and there a name is looked
+/// for first.
+pub(crate) fn find_included(graph: &str, folder: &Path) -> Result<PathBuf, UnknownGraph> {
+    if is_path(graph) { Ok(folder.join(graph)) } else { find_by_name(graph, Some(folder)) }
+}
+
+fn is_path(graph: &str) -> bool {
+    graph.contains('/') || graph.ends_with(".toml")
+}
+
+fn find_by_name(graph: &str, first: Option<&Path>) -> Result<PathBuf, UnknownGraph> {
+    let folders: Vec<PathBuf> = first.map(Path::to_owned).into_iter().chain(folders()).collect();
     let files = folders.iter().map(|folder| folder.join(format!("{graph}.toml")));
     files.into_iter().find(|file| file.is_file()).ok_or_else(|| UnknownGraph {
         name: graph.to_owned(),

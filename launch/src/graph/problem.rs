@@ -134,31 +134,46 @@ impl Problem {
     }
 }
 
+/// Nobody reads more of them; and each is looked up in its file.
+const PROBLEMS_MAX: usize = 200;
+
 /// Problems as they are found.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Problems {
     list: Vec<Problem>,
+    /// Errors beyond those listed.
+    more: usize,
 }
 
 impl Problems {
     /// One more.
     pub(crate) fn push(&mut self, problem: Problem) {
-        self.list.push(problem);
+        if self.list.len() < PROBLEMS_MAX {
+            self.list.push(problem);
+        } else {
+            self.more += usize::from(problem.severity == Severity::Error);
+        }
     }
 
     /// All of another list.
-    pub(crate) fn extend(&mut self, others: impl IntoIterator<Item = Problem>) {
-        self.list.extend(others);
+    pub(crate) fn extend(&mut self, others: Problems) {
+        others.list.into_iter().for_each(|problem| self.push(problem));
+        self.more += others.more;
     }
 
     /// Whether one of them refuses the graph.
     pub(crate) fn refuse(&self) -> bool {
-        self.list.iter().any(|problem| problem.severity == Severity::Error)
+        self.more > 0 || self.list.iter().any(|problem| problem.severity == Severity::Error)
     }
 
     /// How many there are, errors and notes alike.
     pub(crate) fn len(&self) -> usize {
-        self.list.len()
+        self.list.len() + self.more
+    }
+
+    /// Errors beyond those listed.
+    pub(crate) fn more(&self) -> usize {
+        self.more
     }
 
     /// The problems, errors first, each kind in the order of files and lines.
@@ -170,14 +185,6 @@ impl Problems {
             (problem.severity, place)
         });
         list
-    }
-}
-
-impl IntoIterator for Problems {
-    type Item = Problem;
-    type IntoIter = std::vec::IntoIter<Problem>;
-    fn into_iter(self) -> Self::IntoIter {
-        self.list.into_iter()
     }
 }
 

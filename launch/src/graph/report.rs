@@ -131,8 +131,12 @@ fn listing(problems: &Problems, palette: &Palette, with_notes: bool) -> String {
             Severity::Note => {}
         }
     }
+    if problems.more() > 0 {
+        let _ = writeln!(out, "and {} more", problems.more());
+    }
+    let errors = errors + problems.more();
     if errors > 0 {
-        let count = if errors == 1 { "1 error".to_owned() } else { format!("{errors} errors") };
+        let count = counted(errors, "error");
         let _ = writeln!(out, "{}; no process was started", palette.paint(palette.error, &count));
     }
     out
@@ -143,10 +147,16 @@ fn praise(checked: &Checked, palette: &Palette) -> String {
     let (services, topics) = (checked.services.len(), checked.topics.len());
     let _ = writeln!(
         out,
-        "{} {}: {services} services, {topics} topics, seed {}",
+        "{} {}: {}, {}, seed {}",
         palette.paint(palette.good, "in order"),
         palette.paint(palette.strong, &shown(&checked.file)),
+        counted(services, "service"),
+        counted(topics, "topic"),
         checked.seed
     );
     out
+}
+
+fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }

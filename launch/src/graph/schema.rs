@@ -57,6 +57,9 @@ struct Walk<'a> {
 
 impl Walk<'_> {
     fn value(&self, schema: &Value, path: &str, node: &Node, problems: &mut Problems) {
+        if node.is_nonsense() {
+            return;
+        }
         let schema = self.resolve(schema);
         if let Some(choices) = self.choices(schema) {
             return self.choice(&choices, path, node, problems);
@@ -155,7 +158,7 @@ impl Walk<'_> {
                 best = Some((fits, found));
             }
         }
-        problems.extend(best.into_iter().flat_map(|(_, found)| found));
+        problems.extend(best.map(|(_, found)| found).unwrap_or_default());
     }
 
     fn range(&self, schema: &Value, path: &str, node: &Node, problems: &mut Problems) {
@@ -245,6 +248,8 @@ impl Walk<'_> {
         let whole = node.number().filter(|_| kinds.contains(&"integer"));
         let help = match (bare, whole) {
             (Some(bare), _) if kinds.contains(&"number") || kinds.contains(&"integer") => {
+                // As TOML has it, which wants a digit before the point.
+                let bare = bare.parse::<f64>().map_or(bare.to_owned(), |number| number.to_string());
                 format!("write `{path} = {bare}`, without quotes")
             }
             (_, Some(number)) => format!("write a whole number, such as {}", number.round()),

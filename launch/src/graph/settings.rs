@@ -2,10 +2,13 @@
 
 use super::faults::{Fault, read_faults};
 use super::file::shown;
+use super::log_level;
+use super::paths;
 use super::problem::{Problem, Problems};
 use super::source::{Place, Source};
 use super::suggest::hint;
 use super::tree::{Content, Entry, Node, Table};
+use board::switchboard::SLOTS;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,6 +16,8 @@ use std::time::Duration;
 
 /// No computer of a robot takes longer for a step.
 const COMPUTE_MAX_MS: f64 = 60_000.0;
+/// A board has a few places more, for tools and for those who take over.
+const SERVICES_MAX: usize = SLOTS - 28;
 /// A service needs some memory to come up at all, and no robot has more than a terabyte.
 const MEMORY_MIN_MB: f64 = 64.0;
 const MEMORY_MAX_MB: f64 = 1_048_576.0;
@@ -43,7 +48,9 @@ pub(crate) struct Graph {
     /// The services, in the order of the file.
     pub(crate) services: Vec<ServiceTable>,
     /// The file with all that it includes, before the command line changed anything.
-    pub(crate) text: String,
+    pub(crate) written: Table,
+    /// The topics of the view that somebody has chosen, with their keys.
+    pub(crate) view_topics: Vec<(String, String, Place)>,
 }
 
 /// One service's table.
@@ -74,13 +81,14 @@ pub(crate) struct LaunchSettings {
     pub(crate) cpu: Vec<usize>,
     /// How the operating system ranks it.
     pub(crate) priority: Priority,
-    /// Lockstep: how long a step takes, after which its messages are seen and the next step may begin; `None` for no time at all.
+    /// Lockstep: how long a step takes, after which its messages are seen and the next step may begin; `None`
+    /// for no time at all.
     pub(crate) compute: Option<Duration>,
     /// How long its heartbeat may be silent.
     pub(crate) hang_after: Duration,
     /// How long it may take to leave when asked.
     pub(crate) stop_after: Duration,
-    /// What it logs: a level, or directives such as `info,planner=debug`.
+    /// What it logs: a level, or directives such as `info,grid_planner=debug`.
     pub(crate) log: String,
     /// Whether it may end by itself, without an error: one that plays a file, say. Any other end is a death.
     pub(crate) may_end: bool,
@@ -100,7 +108,8 @@ pub(crate) struct Restart {
 }
 
 impl Restart {
-    /// The wait after so many deaths in a row; `None` when the service counts as broken. The first restart is immediate.
+    /// The wait after so many deaths in a row; `None` when the service counts as broken. The first restart is
+    /// immediate.
     pub(crate) fn pause_after(&self, deaths: u32) -> Option<Duration> {
         match deaths {
             _ if deaths > self.give_up_after => None,
@@ -208,7 +217,8 @@ pub(crate) fn read_graph(
         view: ViewSettings::default(),
         faults: Vec::new(),
         services: Vec::new(),
-        text: String::new(),
+        written: Table::default(),
+        view_topics: Vec::new(),
     };
     let (mut faults, mut other_faults) = (None, None);
     let mut name_place = Place::top(source);
@@ -218,16 +228,14 @@ pub(crate) fn read_graph(
             continue;
         }
         let Some(content) = entry.value.table() else {
-            let message = format!("`{}` stands outside of any table", entry.key);
-            let help = "put it below [graph], or below the table of a service";
-            problems.push(Problem::error(&entry.key_place, message, help));
+            problems.push(outside_of_tables(entry));
             continue;
         };
         if entry.key == "graph" {
             other_faults = content.get("fault");
             read_graph_table(&mut graph, &mut name_place, content, problems);
         } else {
-            graph.services.push(read_service(entry, content, problems));
+            graph.services.push(read_service(entry, content, &graph.folder, problems));
         }
     }
     // Those that an experiment or the command line sets replace those of the file.
@@ -236,13 +244,26 @@ pub(crate) fn read_graph(
         graph.faults = read_faults(entry, &roles, problems);
     }
     if graph.view.world.is_none() {
-        let world = graph.defaults.iter().find(|entry| entry.key == "world");
-        graph.view.world = world.and_then(|entry| entry.value.text()).map(str::to_owned);
+        let world = graph.defaults.iter().find(|entry| entry.key == "world").cloned();
+        graph.view.world = world.and_then(|mut world| {
+            paths::rebase(&mut world, &graph.folder);
+            world.value.text().map(str::to_owned)
+        });
     }
     if board::place::Place::new(&graph.name).is_err() {
         let message = format!("`{}` cannot be a board's name", graph.name);
         let help = "give `name` below [graph]: 1 to 20 lower-case letters, digits and hyphens";
         problems.push(Problem::error(&name_place, message, help));
+    }
+    if graph.services.len() > SERVICES_MAX {
+        let count = graph.services.len();
+        let message = format!("{count} services are more than the {SERVICES_MAX} that a board has room for");
+        problems.push(Problem::error(
+            &graph.services[SERVICES_MAX].place,
+            message,
+            "leave out what is not needed",
+        ));
+        return None;
     }
     if graph.services.is_empty() {
         let help = "add a table for each service, such as [simulator]";
@@ -296,7 +317,7 @@ fn read_graph_table(graph: &mut Graph, name_place: &mut Place, table: &Table, pr
             }
             "view" => {
                 if let Some(view) = take(value.table(), entry, "a table", problems) {
-                    read_view(&mut graph.view, &graph.folder, view, problems);
+                    read_view(graph, view, problems);
                 }
             }
             "include" | "fault" => {}
@@ -305,12 +326,15 @@ fn read_graph_table(graph: &mut Graph, name_place: &mut Place, table: &Table, pr
     }
 }
 
-fn read_view(view: &mut ViewSettings, folder: &Path, table: &Table, problems: &mut Problems) {
+fn read_view(graph: &mut Graph, table: &Table, problems: &mut Problems) {
     const KEYS: [&str; 6] = ["world", "truth", "pose", "path", "mission", "clearance"];
     for entry in &table.entries {
-        let ViewSettings { truth, pose, path, mission, clearance, .. } = view;
+        let ViewSettings { truth, pose, path, mission, clearance, .. } = &mut graph.view;
         let slot = match entry.key.as_str() {
-            "world" => view.world.insert(String::new()),
+            "world" => {
+                read_view_world(graph, entry, problems);
+                continue;
+            }
             "truth" => truth,
             "pose" => pose,
             "path" => path,
@@ -321,18 +345,40 @@ fn read_view(view: &mut ViewSettings, folder: &Path, table: &Table, problems: &m
                 continue;
             }
         };
-        if let Some(text) = take(entry.value.text(), entry, "a text", problems) {
-            *slot = text.to_owned();
-            if entry.key == "world" && !folder.join(text).is_file() {
-                let message = format!("there is no world file {text}");
-                let help = format!("the name counts from {}", shown(folder));
-                problems.push(Problem::error(&entry.value.place, message, help));
-            }
+        if let Some(topic) = take(entry.value.text(), entry, "the name of a topic", problems) {
+            topic.clone_into(slot);
+            graph.view_topics.push((entry.key.clone(), topic.to_owned(), entry.value.place.clone()));
         }
     }
 }
 
-fn read_service(entry: &Entry, table: &Table, problems: &mut Problems) -> ServiceTable {
+fn read_view_world(graph: &mut Graph, entry: &Entry, problems: &mut Problems) {
+    let Some(text) = take(entry.value.text(), entry, "a text", problems) else { return };
+    let place = &entry.value.place;
+    let world = paths::rebased(text, place, &graph.folder).unwrap_or_else(|| text.to_owned());
+    if !graph.folder.join(&world).is_file() {
+        let message = format!("there is no world file {text}");
+        let folder = place.source().folder.as_deref().unwrap_or(&graph.folder);
+        problems.push(Problem::error(place, message, format!("the name counts from {}", shown(folder))));
+    }
+    graph.view.world = Some(world);
+}
+
+/// What stands where only tables stand.
+fn outside_of_tables(entry: &Entry) -> Problem {
+    let key = &entry.key;
+    let is_list = |items: &[Node]| !items.is_empty() && items.iter().all(|item| item.table().is_some());
+    let (message, help) = if entry.value.array().is_some_and(is_list) {
+        let message = format!("[[{key}]] makes a list of tables, and a service has one table");
+        (message, format!("write [{key}], with single brackets"))
+    } else {
+        let message = format!("`{key}` stands outside of any table");
+        (message, "put it below [graph], or below the table of a service".to_owned())
+    };
+    Problem::error(&entry.key_place, message, help)
+}
+
+fn read_service(entry: &Entry, table: &Table, folder: &Path, problems: &mut Problems) -> ServiceTable {
     let role = entry.key.clone();
     let plain = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'-';
     let begins = role.bytes().next().is_some_and(|byte| byte.is_ascii_lowercase());
@@ -355,8 +401,11 @@ fn read_service(entry: &Entry, table: &Table, problems: &mut Problems) -> Servic
             "run" => {
                 let text = entry.value.text().filter(|text| !text.is_empty());
                 if let Some(run) = take(text, entry, "the name or the path of a binary", problems) {
-                    service.run = run.to_owned();
-                    service.run_place = entry.value.place.clone();
+                    let place = &entry.value.place;
+                    let is_path = run.contains('/');
+                    let located = is_path.then(|| paths::rebased(run, place, folder)).flatten();
+                    service.run = located.unwrap_or_else(|| run.to_owned());
+                    service.run_place = place.clone();
                 }
             }
             "launch" => {
@@ -367,6 +416,13 @@ fn read_service(entry: &Entry, table: &Table, problems: &mut Problems) -> Servic
             }
             _ => service.parameters.push(entry.clone()),
         }
+    }
+    if let Some(entry) = table.get("launch").and_then(|entry| entry.value.table()?.get("log"))
+        && entry.value.text() == Some(&service.launch.log)
+        && let Some((word, help)) = log_level::mistake(&service.launch.log, &service.run)
+    {
+        let message = format!("`log` of `{}` cannot be `{word}`", service.role);
+        problems.push(Problem::error(&entry.value.place, message, help));
     }
     service
 }
@@ -424,7 +480,7 @@ fn read_launch(launch: &mut LaunchSettings, role: &str, table: &Table, problems:
             "log" => {
                 let text = value.text().filter(|text| tracing_subscriber::EnvFilter::try_new(text).is_ok());
                 let wanted =
-                    "off, error, warn, info, debug, trace, or directives such as \"info,planner=debug\"";
+                    "off, error, warn, info, debug, trace, or directives such as \"info,grid_planner=debug\"";
                 if let Some(log) = take(text, entry, wanted, problems) {
                     launch.log = log.to_owned();
                 }
@@ -521,7 +577,7 @@ fn milliseconds(entry: &Entry, value: &Node, problems: &mut Problems) -> Option<
 
 /// The value, or a problem that says what the key takes.
 pub(super) fn take<T>(value: Option<T>, entry: &Entry, wanted: &str, problems: &mut Problems) -> Option<T> {
-    if value.is_none() {
+    if value.is_none() && !entry.value.is_nonsense() {
         let written = entry.value.place.text();
         let message = if written.is_empty() || written.contains('\n') || entry.value.table().is_some() {
             format!("`{}` takes {wanted}", entry.key)

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::ops::Range;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A text that the user wrote.
@@ -13,18 +14,26 @@ pub(crate) struct Source {
     pub(crate) text: String,
     /// Whether it is a file, whose lines have numbers, and no argument.
     pub(crate) is_file: bool,
+    /// The folder of an included file, from which its paths count; those of others count from the graph's.
+    pub(crate) folder: Option<PathBuf>,
 }
 
 impl Source {
     /// A file's text.
     pub(crate) fn file(name: impl Into<String>, text: impl Into<String>) -> Arc<Self> {
-        Arc::new(Self { name: name.into(), text: text.into(), is_file: true })
+        Arc::new(Self { name: name.into(), text: text.into(), is_file: true, folder: None })
+    }
+
+    /// The text of a file that another one includes.
+    pub(crate) fn included(name: impl Into<String>, text: impl Into<String>, folder: &Path) -> Arc<Self> {
+        let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        Arc::new(Self { name: name.into(), text: text.into(), is_file: true, folder: Some(folder) })
     }
 
     /// An option of the command line, such as `--set` with its argument.
     pub(crate) fn argument(option: &str, argument: &str) -> Arc<Self> {
         let text = format!("{option} {argument}");
-        Arc::new(Self { name: "command line".to_owned(), text, is_file: false })
+        Arc::new(Self { name: "command line".to_owned(), text, is_file: false, folder: None })
     }
 }
 

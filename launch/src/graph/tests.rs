@@ -97,7 +97,7 @@ fn made_up(name: &str) -> Option<Interface> {
     let order = || description("Order", &[("order_id", Kind::U64)]);
     let clearance = || description("Clearance", &[("signal", Kind::U32)]);
     let path = || description("Path", &[("length_m", Kind::F64)]);
-    let world = || json!({ "type": "string" });
+    let world = || json!({ "type": "string", "format": "path" });
     Some(match name {
         "simulator" | "other" => {
             let ranges =
@@ -179,7 +179,7 @@ impl Binaries for MadeUp {
             Some((front, side)) if side >= front => Err(QueryError::Refused(format!(
                 "side_radius_m = {side} must be smaller than front_radius_m = {front}"
             ))),
-            _ => made_up(name).ok_or_else(|| QueryError::Broken("no answer within 2 s".to_owned())),
+            _ => made_up(name).ok_or_else(|| QueryError::Broken("no answer within 60 s".to_owned())),
         }
     }
 }
@@ -326,7 +326,7 @@ fn options_may_be_given_or_not() {
 fn binaries() {
     refused("grid-planner", "grid-planer", "test.toml:16:7: error: there is no binary `grid-planer`", "did you mean `grid-planner`?\n     = looked for /opt/corkboard/bin/grid-planer");
     refused("[referee]", "[umpire]", "test.toml:24:2: error: there is no binary `umpire`", "name another one: `run = \"..\"` below [umpire]");
-    refused("grid-planner", "mute", "test.toml:16:7: error: `mute` does not say what it is: no answer within 2 s", "try `mute --interface`");
+    refused("grid-planner", "mute", "test.toml:16:7: error: `mute` does not say what it is: no answer within 60 s", "try `mute --interface`");
 }
 
 #[test]
@@ -357,10 +357,16 @@ fn tables_of_the_launcher() {
     refused("give_up_after", "giveup_after", "test.toml:20:39: error: `restart` has no key `giveup_after`", "did you mean `give_up_after`?");
     refused("fifo = 40", "fifo = 100", "test.toml:22:12: error: `priority` takes \"normal\", { fifo = 1 to 99 } or { nice = -20 to 19 }", "write such a value");
     refused("cpu = [1]", "hang_after_ms = -5", "test.toml:21:17: error: `hang_after_ms` takes milliseconds, not negative, not -5", "write such a value");
-    refused("cpu = [1]", "log = \"a=b=c\"", "test.toml:21:7: error: `log` takes off, error, warn, info, debug, trace, or directives such as \"info,planner=debug\", not \"a=b=c\"", "");
+    refused("cpu = [1]", "log = \"a=b=c\"", "test.toml:21:7: error: `log` takes off, error, warn, info, debug, trace, or directives such as \"info,grid_planner=debug\", not \"a=b=c\"", "");
     refused("cpu = [1]", "compute_ms = -1", "test.toml:21:14: error: `compute_ms` takes milliseconds from 0 to 60000: how long a step takes in lockstep, not -1", "write such a value");
     refused("cpu = [1]", "compute_ms = 70e3", "test.toml:21:14: error: `compute_ms` takes milliseconds from 0 to 60000: how long a step takes in lockstep, not 70e3", "write such a value");
     refused("[graph]", "seed = 1\n[graph]", "test.toml:1:1: error: `seed` stands outside of any table", "below [graph]");
+    refused("cpu = [1]", "log = \"wran\"", "test.toml:21:7: error: `log` of `planner` cannot be `wran`", "did you mean `warn`?");
+    refused("cpu = [1]", "log = \"info,planner=debug\"", "test.toml:21:7: error: `log` of `planner` cannot be `planner=debug`", "grid_planner");
+    refused_with("[[tof-driver]]\n", "test.toml:25:3: error: [[tof-driver]] makes a list of tables, and a service has one table", "write [tof-driver], with single brackets");
+    refused("[simulator]\n", "[graph.view]\npath = \"plan/pat\"\n[simulator]\n", "test.toml:10:8: error: nobody publishes `plan/pat`, which the view is to draw", "did you mean `plan/path`?");
+    refused("[simulator]\n", "[graph.view]\npath = \"tof/ranges\"\n[simulator]\n", "test.toml:10:8: error: `tof/ranges` is a TofRanges, and the view draws a Path as path", "a Path is on `plan/path`");
+    refused("[simulator]\n", "[graph.view]\ntruth = \"world/trth\"\n[simulator]\n", "test.toml:10:9: error: nobody publishes `world/trth`, which the view is to draw", "remove the line");
     refused("[simulator]\n", "[graph.view]\nworld = \"none.toml\"\n[simulator]\n", "test.toml:10:9: error: there is no world file none.toml", "the name counts from");
     refused("[simulator]\n", "[graph.view]\nwrold = \"none.toml\"\n[simulator]\n", "test.toml:10:1: error: [graph.view] has no key `wrold`", "did you mean `world`?");
     refused_case(&Case::new(&[("test.toml", "[graph]\nname = \"a\"\n")]), "test.toml:1:1: error: this graph has no services", "add a table");
@@ -390,7 +396,123 @@ fn includes() {
         "parts/b.toml:1:2: error: [extra] is in two included files",
         "first here: parts/a.toml:1:2",
     );
-    refused("name = ", "include = [3]\nname = ", "test.toml:2:12: error: `include` takes names of files, not an integer", "write include");
+    refused("name = ", "include = [3]\nname = ", "test.toml:2:12: error: `include` takes graphs by name and files, not an integer", "write include");
+}
+
+#[test]
+fn paths_count_from_the_file_in_which_they_are_written() {
+    let part = RIGHT.replace("[simulator]", "[graph.view]\nworld = \"../worlds/hall.toml\"\n[simulator]");
+    let main = "[graph]\nname = \"mine\"\ninclude = [\"elsewhere/graphs/part.toml\"]\n[planner]\nworld = \"own.toml\"\n";
+    let files = [
+        ("test.toml", main),
+        ("elsewhere/graphs/part.toml", part.as_str()),
+        ("elsewhere/worlds/hall.toml", ""),
+    ];
+    let case = Case::new(&files);
+    let (checked, problems) = case.run();
+    let checked = checked.unwrap_or_else(|| panic!("{:#?}", problems.sorted()));
+    let world = |checked: &Checked, role: &str| {
+        let service = checked.services.iter().find(|service| service.role == role).unwrap();
+        service.parameters["world"].as_str().unwrap().to_owned()
+    };
+    assert_eq!(world(&checked, "simulator"), "elsewhere/graphs/../worlds/hall.toml");
+    assert_eq!(world(&checked, "planner"), "own.toml");
+    assert_eq!(checked.view.world.as_deref(), Some("elsewhere/graphs/../worlds/hall.toml"));
+    // As a text of one file it means the same.
+    let again = Case::new(&[
+        ("test.toml", &checked.text),
+        ("elsewhere/graphs/x", ""),
+        ("elsewhere/worlds/hall.toml", ""),
+    ]);
+    let (again, problems) = again.run();
+    let again = again.unwrap_or_else(|| panic!("{:#?}", problems.sorted()));
+    assert_eq!(
+        [world(&again, "simulator"), world(&again, "planner")],
+        [world(&checked, "simulator"), world(&checked, "planner")]
+    );
+    // Those of the command line count from the graph's folder.
+    let overrides = set("graph.defaults.world=w.toml");
+    let (checked, _) = Case { overrides, ..Case::new(&files) }.run();
+    assert_eq!(world(&checked.unwrap(), "simulator"), "w.toml");
+    // Texts that are no paths stay what they are.
+    let (checked, _) = Case::new(&files).run();
+    assert_eq!(checked.unwrap().services[0].parameters["room"], "207");
+}
+
+#[test]
+fn graphs_are_included_by_name() {
+    let main = "[graph]\nname = \"mine\"\ninclude = [\"part\"]\n";
+    let (checked, problems) = Case::new(&[("test.toml", main), ("part.toml", RIGHT)]).run();
+    assert!(checked.is_some(), "{:#?}", problems.sorted());
+    let case = Case::new(&[("test.toml", &main.replace("part", "no-such-part"))]);
+    refused_case(&case, "test.toml:3:12: error: there is no graph `no-such-part`", "give the path of a file");
+}
+
+#[test]
+fn only_plain_text_of_some_size_is_a_graph() {
+    let case = Case::new(&[("test.toml", "")]);
+    let file = case.folder.path().join("test.toml");
+    std::fs::write(&file, vec![b'#'; 2 << 20]).unwrap();
+    refused_case(
+        &case,
+        "error: cannot read the graph file test.toml: it has 2 MiB, more than 1 MiB of content, which is the limit",
+        "name a graph file",
+    );
+    std::fs::write(&file, b"name = \"caf\xe9\"").unwrap();
+    refused_case(
+        &case,
+        "error: cannot read the graph file test.toml: line 1, byte 12: the byte 0xe9 is no UTF-8; save the file as UTF-8",
+        "correct that byte",
+    );
+    std::fs::remove_file(&file).unwrap();
+    std::fs::create_dir(&file).unwrap();
+    refused_case(
+        &case,
+        "error: cannot read the graph file test.toml: this is a folder, and only plain files are read and written",
+        "name a graph file",
+    );
+    let include = |name: &str| RIGHT.replace("[graph]\n", &format!("[graph]\ninclude = [\"{name}\"]\n"));
+    let case = Case::new(&[("test.toml", &include("/dev/zero.toml/../zero"))]);
+    assert_eq!(case.errors().len(), 1);
+    let case = Case::new(&[("test.toml", &include("./pipe"))]);
+    rustix::fs::mkfifoat(rustix::fs::CWD, case.folder.path().join("pipe"), rustix::fs::Mode::RWXU).unwrap();
+    refused_case(
+        &case,
+        "test.toml:2:12: error: cannot read the included file ./pipe: this is a pipe, and only plain files are read and written",
+        "from the folder of this file",
+    );
+}
+
+#[test]
+fn graphs_are_bounded() {
+    let many = |count: usize, item: fn(usize) -> String| (0..count).map(item).collect::<String>();
+    let services = format!("[graph]\nname = \"a\"\n{}", many(101, |n| format!("[s{n}]\n")));
+    refused_case(
+        &Case::new(&[("test.toml", &services)]),
+        "test.toml:103:2: error: 101 services are more than the 100 that a board has room for",
+        "leave out",
+    );
+    let tables = many(3000, |n| format!("[s{n}]\n"));
+    refused_case(
+        &Case::new(&[("test.toml", &tables)]),
+        "test.toml:1:2: error: 3000 keys in one table are more than 1000",
+        "leave out",
+    );
+    let parts: Vec<(String, String)> = (0..20)
+        .map(|n| (format!("p{n}.toml"), format!("[graph]\ninclude = [\"p{}.toml\"]\n", n + 1)))
+        .collect();
+    let files: Vec<(&str, &str)> = parts.iter().map(|(name, text)| (name.as_str(), text.as_str())).collect();
+    let case =
+        Case::new(&[&files[..], &[("test.toml", "[graph]\ninclude = \"p0.toml\"\n[referee]\n")]].concat());
+    refused_case(
+        &case,
+        "p14.toml:2:12: error: more than 16 files include each other in a row, or 100 are included in all",
+        "put some of them together",
+    );
+    // However many mistakes there are, a page of them is shown.
+    let wrong = many(1000, |n| format!("x{n} = 1\n"));
+    let (_, problems) = Case::new(&[("test.toml", &format!("{RIGHT}{wrong}"))]).run();
+    assert_eq!((problems.sorted().len(), problems.more()), (200, 800));
 }
 
 #[test]
@@ -406,6 +528,28 @@ fn faults() {
     refused_with("[[fault]]\nat_s = 1\nstop = \"planner\"\ndown_s = 2\n", "test.toml:28:1: error: `down_s` means nothing to `stop`", "first step");
     refused_with("[[fault]]\nat_s = 1\nstop = \"planner\"\nfro_s = 2\n", "test.toml:28:1: error: a fault has no key `fro_s`", "did you mean `for_s`?");
     refused_override(set("graph.fault=[3]"), "command line: error: `fault` takes tables, not an integer", "write tables");
+    // Each mark stands under what is meant.
+    refused_override(set("graph.fault=[{ at_s = 1, kill = \"planer\" }]"), "command line: error: the graph has no service `planer`",
+        "     | --set graph.fault=[{ at_s = 1, kill = \"planer\" }]\n     |                                       ^^^^^^^^ did you mean");
+}
+
+#[test]
+fn all_that_is_wrong_with_a_fault_is_told() {
+    let text = format!(
+        "{RIGHT}[[fault]]\nat_s = -1\nkill = \"planer\"\nfro_s = 2\ndown_s = \"x\"\n[[fault]]\nstop = 3\n"
+    );
+    let errors = Case::new(&[("test.toml", &text)]).errors();
+    for words in [
+        "`at_s` takes seconds",
+        "no service `planer`",
+        "no key `fro_s`",
+        "`down_s` takes",
+        "a fault lacks `at_s`",
+        "`stop` takes the name",
+    ] {
+        assert!(errors.iter().any(|error| error.contains(words)), "{words} is not told: {errors:#?}");
+    }
+    assert_eq!(errors.len(), 6, "{errors:#?}");
 }
 
 fn checked(text: &str, overrides: Overrides) -> Checked {
@@ -467,6 +611,13 @@ fn overrides() {
     refused_override(set("planer.x=1"), "command line: error: the graph has no service `planer`", "did you mean `planner`?");
     refused_override(set("planner.radius=1"), "command line: error: `planner` has no parameter `radius`", "it has");
     refused_override(set("planner.robot_radius_m=7"), "command line: error: `robot_radius_m` of `planner` is 7 m, which is out of range", "     | --set planner.robot_radius_m=7\n     |                              ^ it must be above 0");
+    refused_override(set("planer.launch.log=debug"), "command line: error: the graph has no service `planer`", "     | --set planer.launch.log=debug\n     |       ^^^^^^ did you mean");
+    refused_override(set("planner.radius=1"), "command line: error: `planner` has no parameter `radius`", "     | --set planner.radius=1\n     |               ^^^^^^ it has");
+    refused_override(set("collision-avoidance.front_radius_m=nan"), "command line: error: `nan` is no number that a robot can work with", "write a finite number");
+    refused_override(set("collision-avoidance.bounds={ low_m = inf }"), "command line: error: `inf` is no number that a robot can work with", "     |                                            ^^^ write a finite");
+    refused_override(set("planner.launch.hang_after_ms=nan"), "command line: error: `nan` is no number that a robot can work with", "finite");
+    refused_override(set("planner.robot_radius_m=.5.5"), "command line: error: `robot_radius_m` of `planner` takes a number, not a text", "the default is");
+    refused_override(set("planner.robot_radius_m=\".5\""), "command line: error: `robot_radius_m` of `planner` takes a number, not a text", "write `robot_radius_m = 0.5`, without quotes");
     refused_override(set("planner"), "command line: error: `planner` has no `=`", "write --set role.parameter=value");
     refused_override(set("planner=1"), "command line: error: `planner` names no parameter", "write --set planner.parameter=value");
     refused_override(
@@ -504,6 +655,27 @@ fn overrides_take_effect() {
     assert_eq!(checked.services[2].launch.log, "debug");
     let notes: Vec<_> = problems.sorted().into_iter().map(|problem| problem.message.clone()).collect();
     assert_eq!(notes, ["`sampling-planner` has no parameter `weights`, and does without"]);
+}
+
+#[test]
+fn numbers_of_the_command_line_need_no_digit_before_the_point() {
+    for (text, number) in [(".5", 0.5), ("+.2", 0.2), ("1.", 1.0), ("0.25", 0.25)] {
+        let overrides = set(&format!("planner.robot_radius_m={text}"));
+        let (checked, problems) = Case { overrides, ..Case::new(&[("test.toml", RIGHT)]) }.run();
+        let checked = checked.unwrap_or_else(|| panic!("{text}: {:#?}", problems.sorted()));
+        assert_eq!(checked.services[2].parameters["robot_radius_m"], number, "{text}");
+    }
+}
+
+#[test]
+fn what_answers_a_topic_is_no_advice_for_it() {
+    let text = RIGHT.replace("external = [\"mission/orders\"]\n", "");
+    let errors = Case::new(&[("test.toml", &text)]).errors();
+    assert!(
+        errors[0].contains("nobody publishes `mission/orders`") && !errors[0].contains("` publishes `"),
+        "{}",
+        errors[0]
+    );
 }
 
 #[test]

@@ -45,6 +45,8 @@ fn value(node: &Node) -> String {
         Content::Date(date) => date.clone(),
         Content::Number(number) => number.to_string(),
         Content::Boolean(value) => value.to_string(),
+        // A graph that holds it is refused.
+        Content::Nonsense => "nan".to_owned(),
         Content::Array(items) => format!("[{}]", items.iter().map(value).collect::<Vec<_>>().join(", ")),
         Content::Table(table) => {
             let pairs: Vec<_> = table

@@ -4,10 +4,10 @@ use super::check::{CheckedTopic, Publisher, Reader};
 use super::problem::{Problem, Problems};
 use super::settings::{Graph, ServiceTable};
 use super::source::Place;
-use super::suggest::nearest;
+use super::suggest::{nearest, quoted};
 use board::manifest::ELEMENTS;
 use board::{Direction, Interface, PortDescription};
-use messages::{Message as _, RunSummary};
+use messages::{Clearance, Message as _, MissionStatus, Path, PoseEstimate, RunSummary, WorldTruth};
 use std::collections::BTreeMap;
 
 /// A service of the graph with what its binary says of itself.
@@ -33,8 +33,8 @@ struct Ports<'a> {
     readers: Vec<Port<'a>>,
 }
 
-/// Connects ports to topics. `complete` is false when a service's interface is not known: then a topic without a publisher
-/// is no mistake of the graph.
+/// Connects ports to topics. `complete` is false when a service's interface is not known: then a topic
+/// without a publisher is no mistake of the graph.
 pub(crate) fn connect(
     graph: &Graph,
     members: &[Member<'_>],
@@ -52,9 +52,9 @@ pub(crate) fn connect(
             }
         }
     }
-    let published: Vec<(&str, &str)> = by_topic
+    let published: Vec<(&str, Port<'_>)> = by_topic
         .iter()
-        .flat_map(|(topic, ports)| ports.publishers.iter().map(move |port| (*topic, port.role)))
+        .flat_map(|(topic, ports)| ports.publishers.iter().map(move |port| (*topic, *port)))
         .collect();
     for (topic, ports) in &by_topic {
         check_publishers(topic, ports, problems);
@@ -67,6 +67,7 @@ pub(crate) fn connect(
     check_external(graph, &by_topic, complete, problems);
     check_finish(graph, &by_topic, complete, problems);
     if complete {
+        check_view(graph, &by_topic, problems);
         note_unread(graph, &by_topic, problems);
     }
     by_topic.into_iter().filter_map(|(topic, ports)| checked(graph, topic, &ports)).collect()
@@ -113,19 +114,26 @@ fn check_layouts(topic: &str, ports: &Ports<'_>, problems: &mut Problems) {
     }
 }
 
-fn check_missing(topic: &str, ports: &Ports<'_>, published: &[(&str, &str)], problems: &mut Problems) {
+fn check_missing(topic: &str, ports: &Ports<'_>, published: &[(&str, Port<'_>)], problems: &mut Problems) {
     let needing: Vec<_> = ports.readers.iter().filter(|port| port.description.required).collect();
     let Some(first) = needing.first() else { return };
     let roles: Vec<_> = needing.iter().map(|port| format!("`{}`", port.role)).collect();
     let verb = if roles.len() == 1 { "needs" } else { "need" };
     let message = format!("nobody publishes `{topic}`, which {} {verb}", roles.join(" and "));
     let subject = topic.split('/').next().unwrap_or(topic);
-    let near = nearest(topic, published.iter().map(|(known, _)| *known));
-    let kin = published.iter().filter(|(known, _)| {
-        Some(*known) == near || (known.split('/').next() == Some(subject) && known.contains('/'))
-    });
-    let kin: Vec<_> = kin.map(|(known, role)| format!("`{role}` publishes `{known}`")).take(3).collect();
     let what = first.description.message.name.as_str();
+    let near = nearest(topic, published.iter().map(|(known, _)| *known));
+    // What one of those that wait for the topic says itself is an answer to it, not the topic.
+    let is_kin = |known: &str, port: &Port<'_>| {
+        let is_near = Some(known) == near
+            || (known.split('/').next() == Some(subject)
+                && known.contains('/')
+                && port.description.message.name == what);
+        is_near && !needing.iter().any(|needing| needing.role == port.role)
+    };
+    let kin = published.iter().filter(|(known, port)| is_kin(known, port));
+    let kin: Vec<_> =
+        kin.map(|(known, port)| format!("`{}` publishes `{known}`", port.role)).take(3).collect();
     let mut help = format!(
         "add a service that publishes it (a {what}), or list it as `external` below [graph] if a tool does"
     );
@@ -197,6 +205,41 @@ fn check_finish(
         let help = "name the topic of a referee, such as `run/summary`";
         problems
             .push(Problem::error(place, message, help).see(publisher.place, format!("[{}]", publisher.role)));
+    }
+}
+
+/// Topics of the view that somebody has chosen are there, and are what the view draws.
+fn check_view(graph: &Graph, by_topic: &BTreeMap<&str, Ports<'_>>, problems: &mut Problems) {
+    for (key, topic, place) in &graph.view_topics {
+        let drawn = match key.as_str() {
+            "truth" => WorldTruth::NAME,
+            "pose" => PoseEstimate::NAME,
+            "path" => Path::NAME,
+            "mission" => MissionStatus::NAME,
+            _ => Clearance::NAME,
+        };
+        let all = by_topic
+            .iter()
+            .filter(|(_, ports)| ports.publishers.iter().any(|port| port.description.message.name == drawn));
+        let all: Vec<&str> = all.map(|(topic, _)| *topic).collect();
+        if all.contains(&topic.as_str()) || graph.external.iter().any(|(external, _)| external == topic) {
+            continue;
+        }
+        let message = match by_topic.get(topic.as_str()).and_then(|ports| ports.publishers.first()) {
+            Some(port) => {
+                format!(
+                    "`{topic}` is a {}, and the view draws a {drawn} as {key}",
+                    port.description.message.name
+                )
+            }
+            None => format!("nobody publishes `{topic}`, which the view is to draw"),
+        };
+        let help = match nearest(topic, all.iter().copied()) {
+            Some(known) => format!("did you mean `{known}`?"),
+            None if all.is_empty() => "remove the line".to_owned(),
+            None => format!("a {drawn} is on {}", quoted(all)),
+        };
+        problems.push(Problem::error(place, message, help));
     }
 }
 

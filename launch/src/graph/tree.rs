@@ -30,6 +30,8 @@ pub(crate) enum Content {
     Array(Vec<Node>),
     /// Named values.
     Table(Table),
+    /// What was complained about already, such as `nan`.
+    Nonsense,
 }
 
 /// A name, a value, and where both stand.
@@ -82,6 +84,22 @@ impl Node {
             Content::Date(_) => "a date",
             Content::Array(_) => "an array",
             Content::Table(_) => "a table",
+            Content::Nonsense => "nonsense",
+        }
+    }
+
+    /// Whether it was complained about already.
+    pub(crate) fn is_nonsense(&self) -> bool {
+        matches!(self.content, Content::Nonsense)
+    }
+
+    /// The same of it or anything within.
+    pub(crate) fn has_nonsense(&self) -> bool {
+        match &self.content {
+            Content::Nonsense => true,
+            Content::Array(items) => items.iter().any(Self::has_nonsense),
+            Content::Table(table) => table.entries.iter().any(|entry| entry.value.has_nonsense()),
+            _ => false,
         }
     }
 
@@ -121,6 +139,7 @@ impl Node {
             Content::Text(text) | Content::Date(text) => text.clone().into(),
             Content::Number(number) => number.clone().into(),
             Content::Boolean(value) => (*value).into(),
+            Content::Nonsense => serde_json::Value::Null,
             Content::Array(items) => items.iter().map(Self::to_json).collect(),
             Content::Table(table) => {
                 let pairs = table.entries.iter().map(|entry| (entry.key.clone(), entry.value.to_json()));
@@ -130,23 +149,31 @@ impl Node {
     }
 }
 
+/// Mistakes in the syntax that are told: after so many the file is no TOML at all.
+const SYNTAX_ERRORS_MAX: usize = 20;
+
+/// Keys of one table: a graph has its services, a service its parameters.
+const KEYS_MAX: usize = 1000;
+
 /// Reads a TOML file. Every mistake in its syntax is reported; with one there is no table.
 pub(crate) fn parse(source: &Arc<Source>, problems: &mut Problems) -> Option<Table> {
     let (table, errors) = DeTable::parse_recoverable(&source.text);
-    for error in &errors {
+    for error in errors.iter().take(SYNTAX_ERRORS_MAX) {
         problems.push(syntax_problem(source, error));
     }
-    let table = convert_table(source, table.get_ref(), problems);
-    errors.is_empty().then_some(table)
+    let table = Convert { source, offset: 0, problems }.table(table.get_ref());
+    errors.is_empty().then_some(table).flatten()
 }
 
-/// Reads one TOML value that begins at byte `offset` of `source`; what is no TOML is a text without quotes.
+/// Reads one TOML value that begins at byte `offset` of `source`, of an argument of the command line. What is
+/// no TOML is a number where it can only be one, as `.5`, and else a text without quotes.
 pub(crate) fn parse_value(source: &Arc<Source>, offset: usize, problems: &mut Problems) -> Node {
     let text = source.text.get(offset..).unwrap_or_default();
     let place = Place::new(source, offset..source.text.len());
+    let number = || text.trim().parse().ok().and_then(serde_json::Number::from_f64);
     let content = match DeValue::parse(text) {
-        Ok(value) => convert(source, value.get_ref(), &place, problems),
-        Err(_) => Content::Text(text.to_owned()),
+        Ok(value) => Convert { source, offset, problems }.value(value.get_ref(), &place),
+        Err(_) => number().map_or_else(|| Content::Text(text.to_owned()), Content::Number),
     };
     Node { content, place }
 }
@@ -184,54 +211,68 @@ fn syntax_problem(source: &Arc<Source>, error: &toml::de::Error) -> Problem {
     Problem::error(&place, format!("no TOML: {what}"), help)
 }
 
-fn convert_table(source: &Arc<Source>, table: &DeTable<'_>, problems: &mut Problems) -> Table {
-    let mut entries: Vec<Entry> = table
-        .iter()
-        .map(|(key, value)| Entry {
-            key: key.get_ref().to_string(),
-            key_place: Place::new(source, key.span()),
-            value: convert_spanned(source, value, problems),
-        })
-        .collect();
-    // The parser hands them out by name.
-    entries.sort_by_key(|entry| entry.key_place.start());
-    Table { entries }
+/// Gives what the parser has read its places.
+struct Convert<'a> {
+    source: &'a Arc<Source>,
+    /// Where in the source the text begins that was parsed.
+    offset: usize,
+    problems: &'a mut Problems,
 }
 
-fn convert_spanned(source: &Arc<Source>, value: &Spanned<DeValue<'_>>, problems: &mut Problems) -> Node {
-    let place = Place::new(source, value.span());
-    Node { content: convert(source, value.get_ref(), &place, problems), place }
-}
+impl Convert<'_> {
+    fn place(&self, span: std::ops::Range<usize>) -> Place {
+        Place::new(self.source, span.start + self.offset..span.end + self.offset)
+    }
 
-fn convert(source: &Arc<Source>, value: &DeValue<'_>, place: &Place, problems: &mut Problems) -> Content {
-    match value {
-        DeValue::String(text) => Content::Text(text.to_string()),
-        DeValue::Boolean(value) => Content::Boolean(*value),
-        DeValue::Datetime(date) => Content::Date(date.to_string()),
-        DeValue::Array(items) => {
-            Content::Array(items.iter().map(|item| convert_spanned(source, item, problems)).collect())
+    /// `None` for one that is too large, which is told.
+    fn table(&mut self, table: &DeTable<'_>) -> Option<Table> {
+        let first = table.iter().map(|(key, _)| key.span()).min_by_key(|span| span.start);
+        if let Some(first) = first.filter(|_| table.len() > KEYS_MAX) {
+            let message = format!("{} keys in one table are more than {KEYS_MAX}", table.len());
+            self.problems.push(Problem::error(&self.place(first), message, "leave out what is not needed"));
+            return None;
         }
-        DeValue::Table(table) => Content::Table(convert_table(source, table, problems)),
-        DeValue::Integer(integer) => {
-            let (digits, radix) = (integer.as_str(), integer.radix());
-            let number = i64::from_str_radix(digits, radix).map(serde_json::Number::from);
-            let number = number.or_else(|_| u64::from_str_radix(digits, radix).map(serde_json::Number::from));
-            Content::Number(number.unwrap_or_else(|_| {
-                problems.push(Problem::error(
-                    place,
-                    "this integer does not fit into 64 bits",
-                    "write a smaller one",
-                ));
-                0.into()
-            }))
+        let mut entries: Vec<Entry> = Vec::with_capacity(table.len());
+        for (key, value) in table.iter() {
+            let key_place = self.place(key.span());
+            entries.push(Entry { key: key.get_ref().to_string(), key_place, value: self.node(value) });
         }
-        DeValue::Float(float) => {
-            let number = float.as_str().replace('_', "").parse().ok().and_then(serde_json::Number::from_f64);
-            Content::Number(number.unwrap_or_else(|| {
+        // The parser hands them out by name.
+        entries.sort_by_key(|entry| entry.key_place.start());
+        Some(Table { entries })
+    }
+
+    fn node(&mut self, value: &Spanned<DeValue<'_>>) -> Node {
+        let place = self.place(value.span());
+        Node { content: self.value(value.get_ref(), &place), place }
+    }
+
+    fn value(&mut self, value: &DeValue<'_>, place: &Place) -> Content {
+        match value {
+            DeValue::String(text) => Content::Text(text.to_string()),
+            DeValue::Boolean(value) => Content::Boolean(*value),
+            DeValue::Datetime(date) => Content::Date(date.to_string()),
+            DeValue::Array(items) => Content::Array(items.iter().map(|item| self.node(item)).collect()),
+            DeValue::Table(table) => self.table(table).map_or(Content::Nonsense, Content::Table),
+            DeValue::Integer(integer) => {
+                let (digits, radix) = (integer.as_str(), integer.radix());
+                let number = i64::from_str_radix(digits, radix).map(serde_json::Number::from);
+                let number =
+                    number.or_else(|_| u64::from_str_radix(digits, radix).map(serde_json::Number::from));
+                let message = "this integer does not fit into 64 bits";
+                number.map_or_else(|_| self.nonsense(place, message, "write a smaller one"), Content::Number)
+            }
+            DeValue::Float(float) => {
+                let number = float.as_str().replace('_', "").parse().ok();
+                let number = number.and_then(serde_json::Number::from_f64).map(Content::Number);
                 let message = format!("`{float}` is no number that a robot can work with");
-                problems.push(Problem::error(place, message, "write a finite number"));
-                0.into()
-            }))
+                number.unwrap_or_else(|| self.nonsense(place, &message, "write a finite number"))
+            }
         }
+    }
+
+    fn nonsense(&mut self, place: &Place, message: &str, help: &str) -> Content {
+        self.problems.push(Problem::error(place, message, help));
+        Content::Nonsense
     }
 }

@@ -10,14 +10,20 @@ pub use traverse::{CellsAlong, CellsBetween};
 use crate::Pose2;
 use nalgebra::Point2;
 
-/// No grid has more cells than this (a square of 16 384).
-pub const MOST_CELLS: u64 = 1 << 28;
+/// No grid has more cells than this (a square of 8192, at 5 cm one of 409 m): what is worked out for each
+/// cell then still fits into the memory of a robot's computer.
+pub const MOST_CELLS: u64 = 1 << 26;
+/// No grid has more columns or rows than this, so that a column or row and its neighbour stay apart in single
+/// precision.
+pub const LONGEST_SIDE: u32 = (1 << 24) - 2;
 
 /// Why a grid cannot be.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum GridError {
-    /// No cells at all, or more than [`MOST_CELLS`].
-    #[error("a grid of {width} x {height} cells: it needs at least one, and has at most {MOST_CELLS}")]
+    /// No cells at all, or more than [`MOST_CELLS`], or a side longer than [`LONGEST_SIDE`].
+    #[error(
+        "a grid of {width} x {height} cells: it needs at least one, and has at most {MOST_CELLS}, {LONGEST_SIDE} along a side"
+    )]
     BadSize {
         /// Columns.
         width: u32,
@@ -64,7 +70,8 @@ impl Cell {
     }
 }
 
-/// Where the cells of a grid lie, as in ROS: the origin is the outer corner of cell (0, 0), rows follow each other along y.
+/// Where the cells of a grid lie, as in ROS: the origin is the outer corner of cell (0, 0), rows follow each
+/// other along y.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridFrame {
     width: u32,
@@ -76,11 +83,11 @@ pub struct GridFrame {
 }
 
 impl GridFrame {
-    /// A grid of `width` columns and `height` rows of square cells with sides of `resolution_m`, whose outer corner and x
-    /// axis lie at `origin`.
+    /// A grid of `width` columns and `height` rows of square cells with sides of `resolution_m`, whose outer
+    /// corner and x axis lie at `origin`.
     pub fn new(width: u32, height: u32, resolution_m: f64, origin: Pose2) -> Result<Self, GridError> {
         let cells = u64::from(width) * u64::from(height);
-        if cells == 0 || cells > MOST_CELLS {
+        if cells == 0 || cells > MOST_CELLS || width.max(height) > LONGEST_SIDE {
             return Err(GridError::BadSize { width, height });
         }
         if !(resolution_m > 0.0 && resolution_m.is_finite() && (1.0 / resolution_m).is_finite()) {

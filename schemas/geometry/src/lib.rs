@@ -19,11 +19,11 @@ pub mod world;
 pub use body::{Body, BodyKind, Prism};
 pub use cone::Cone;
 pub use grid::{
-    Cell, CellsAlong, CellsBetween, Grid, GridError, GridFrame, MOST_CELLS, Occupancy, OccupancyGrid,
-    log_odds, probability,
+    Cell, CellsAlong, CellsBetween, Grid, GridError, GridFrame, LONGEST_SIDE, MOST_CELLS, Occupancy,
+    OccupancyGrid, log_odds, probability,
 };
 pub use hull::Hull;
-pub use map_file::{MapError, MapHeader, MapImage, MapMode, MapProblem};
+pub use map_file::{MapError, MapHeader, MapImage, MapMode, MapProblem, Pixel};
 pub use nalgebra::{Point2, Vector2};
 pub use polygon::{Polygon, PolygonError, Shape, is_simple};
 pub use pose::Pose2;

@@ -1,31 +1,61 @@
 //! Maps as files: the YAML and image pair of the ROS map servers.
 //!
-//! The YAML names the image and says what its pixels mean: `image` (its path, relative to the YAML), `resolution` (metres a
-//! pixel), `origin` ([x, y, yaw] of the outer corner of the lower left pixel), `negate` (0 or 1: dark is free), `mode`
-//! (`trinary`, `scale`, `raw`; trinary when left out), `occupied_thresh`, `free_thresh`. The image's first row is the map's
-//! last. Other keys are ignored, as map servers do.
+//! The YAML names the image and says what its pixels mean: `image` (its path, relative to the YAML),
+//! `resolution` (metres a pixel), `origin` ([x, y, yaw] of the outer corner of the lower left pixel),
+//! `negate` (0 or 1: dark is free), `mode` (`trinary`, `scale`, `raw`; trinary when left out),
+//! `occupied_thresh`, `free_thresh`. The image's first row is the map's last. Other keys and whatever stands
+//! below them are ignored, as map servers do.
+//!
+//! Map servers differ in what they make of colours and transparency. This reader does as `map_server` of ROS
+//! 1 and as nav2 up to Iron: colours are averaged, in trinary maps the opacity along with them. (nav2 since
+//! Jazzy weighs colours by luminance, and takes what is not fully opaque for unknown in trinary maps too.)
+//! Indexed images have the colours of their palette, and 16 bits count in full, as in nav2.
 
+mod image_file;
+mod save;
 mod yaml;
 
-use crate::{GridError, GridFrame, MOST_CELLS, Occupancy, OccupancyGrid, Pose2};
-use image::codecs::pnm::{PnmEncoder, PnmSubtype, SampleEncoding};
-use image::{DynamicImage, GrayAlphaImage, GrayImage, ImageDecoder, ImageFormat, ImageReader};
-use std::fs::File;
-use std::io::BufWriter;
+pub use save::MapImage;
+
+use crate::{GridError, GridFrame, Occupancy, OccupancyGrid, Pose2};
+use files::{FileError, FileProblem};
 use std::path::{Path, PathBuf};
 use yaml::{Entry, Value};
+
+/// A YAML of a map has a few hundred bytes; this leaves room for the notes of a lifetime.
+const YAML_MAX: u64 = 256 << 10;
+
+/// Metres a pixel: below, a robot's map has more cells than any computer's memory; above, a robot fits
+/// between two of them.
+const RESOLUTION_M: std::ops::RangeInclusive<f64> = 0.001..=10.0;
+
+/// No place on earth lies farther from a map's origin, in metres.
+const FARTHEST_M: f64 = 1e8;
 
 /// What a pixel means. With p = 1 - brightness (brightness itself if negated), both from 0 to 1:
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MapMode {
-    /// p above `occupied_thresh` is occupied, below `free_thresh` free, and between unknown.
+    /// p above `occupied_thresh` is occupied, below `free_thresh` free, and between unknown. The opacity of
+    /// an image that has one is averaged into the brightness as a fourth colour.
     #[default]
     Trinary,
-    /// The same outside of the thresholds; between them the probability rises in proportion. A pixel that is not fully
-    /// opaque is unknown.
+    /// The same outside of the thresholds; between them the probability rises in proportion. A pixel that is
+    /// not fully opaque is unknown.
     Scale,
-    /// The pixel's value, 0 to 255, is the per cent; what is above 100 is unknown.
+    /// The pixel's brightness, 0 to 255, is the per cent; what is above 100 is unknown. Neither `negate` nor
+    /// opacity counts.
     Raw,
+}
+
+/// A pixel, in whole steps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pixel {
+    /// Red, green and blue, from 0 to `full`; of a grey image three times the same.
+    pub colours: [u32; 3],
+    /// From 0, transparent, to `full`; `None` in an image without transparency.
+    pub opacity: Option<u32>,
+    /// The brightest step: 255 or 65 535.
+    pub full: u32,
 }
 
 /// Everything that the YAML of a map says.
@@ -61,8 +91,18 @@ pub struct MapError {
 #[derive(Debug, thiserror::Error)]
 pub enum MapProblem {
     /// It cannot be read or written.
-    #[error("{0}")]
-    Io(#[from] std::io::Error),
+    #[error(transparent)]
+    File(#[from] FileProblem),
+    /// The image that a YAML names cannot be read.
+    #[error("{problem}; {} names it, and the path counts from the folder of that file{hint}", yaml.display())]
+    Named {
+        /// The YAML.
+        yaml: PathBuf,
+        /// Why the image cannot be read.
+        problem: FileProblem,
+        /// What may be meant by it.
+        hint: &'static str,
+    },
     /// It is not the YAML that maps are written in.
     #[error("line {line}: {problem}")]
     Syntax {
@@ -97,9 +137,27 @@ pub enum MapProblem {
         /// Above it a cell is occupied.
         occupied_thresh: f64,
     },
-    /// The image is broken, or of a kind other than PGM, PBM, PPM, PAM or PNG.
-    #[error("it is no image that can be read: {0}")]
+    /// The image is broken, or of a kind other than PGM, PBM, PPM, PAM, PNG or BMP.
+    #[error("it is no image that can be read (PGM, PBM, PPM, PAM, PNG or BMP): {0}")]
     Image(#[from] image::ImageError),
+    /// More in the file than its pixels: where they begin is in doubt.
+    #[error(
+        "{surplus} more than {width} x {height} pixels; is the head of the file not as it should be, such as one that ends in CR LF?"
+    )]
+    Surplus {
+        /// How much there is too much, in words.
+        surplus: String,
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// The name under which a map is to be saved is that of an image.
+    #[error("a map is saved under the name of its YAML, such as {}; the image is written beside it", proposal.display())]
+    NamedLikeImage {
+        /// A name that would do.
+        proposal: PathBuf,
+    },
     /// The image's size or the YAML's numbers make no grid.
     #[error(transparent)]
     Grid(#[from] GridError),
@@ -125,8 +183,8 @@ impl MapHeader {
         let find = |key: &'static str| entries.iter().find(|entry| entry.key == key);
         let need = |key: &'static str| find(key).ok_or(MapProblem::Missing { key });
         let mode = find("mode").map_or(Ok(MapMode::default()), mode)?;
-        let resolution_m =
-            number("resolution", need("resolution")?, "a positive number of metres", |m| m > 0.0)?;
+        let wanted = "a positive number of metres, from 0.001 to 10";
+        let resolution_m = number("resolution", need("resolution")?, wanted, |m| RESOLUTION_M.contains(&m))?;
         let threshold = |key| number(key, need(key)?, "a number from 0 to 1", |t| (0.0..=1.0).contains(&t));
         // Raw maps have no use for thresholds; otherwise there is no value that suits every map server.
         let [occupied_thresh, free_thresh] = match mode {
@@ -164,13 +222,21 @@ impl MapHeader {
         )
     }
 
-    /// What a pixel means: `brightness` and `opacity` from 0 to 1.
-    pub fn occupancy(&self, brightness: f64, opacity: f64) -> Occupancy {
-        if self.mode == MapMode::Raw {
-            return Occupancy::from_ros((brightness * 255.0).round().min(101.0) as i8);
+    /// What a pixel means. Thresholds are met exactly: fractions are formed of whole numbers.
+    pub fn occupancy(&self, pixel: Pixel) -> Occupancy {
+        let sum = |values: &[u32]| values.iter().map(|&value| u64::from(value)).sum::<u64>();
+        let (mut bright, mut parts) = (sum(&pixel.colours), 3);
+        if let (MapMode::Trinary, Some(opacity)) = (self.mode, pixel.opacity) {
+            bright += u64::from(opacity);
+            parts = 4;
         }
-        let occupied = if self.negate { brightness } else { 1.0 - brightness };
-        if opacity < 1.0 {
+        let all = parts * u64::from(pixel.full);
+        let share = |part: u64| part as f64 / all as f64;
+        if self.mode == MapMode::Raw {
+            return Occupancy::from_ros((share(bright) * 255.0).round().min(101.0) as i8);
+        }
+        let occupied = share(if self.negate { bright } else { all.saturating_sub(bright) });
+        if self.mode == MapMode::Scale && pixel.opacity.is_some_and(|opacity| opacity < pixel.full) {
             Occupancy::UNKNOWN
         } else if occupied > self.occupied_thresh {
             Occupancy::OCCUPIED
@@ -204,6 +270,7 @@ fn bad(key: &'static str, entry: &Entry, wanted: &'static str) -> MapProblem {
     let value = match &entry.value {
         Value::Text(text) => text.clone(),
         Value::List(items) => format!("[{}]", items.join(", ")),
+        Value::Other => "a table or a longer list".to_owned(),
     };
     MapProblem::BadValue { line: entry.line, key, value, wanted }
 }
@@ -236,13 +303,12 @@ fn flag(entry: &Entry) -> Result<bool, MapProblem> {
 }
 
 fn origin(entry: &Entry) -> Result<Pose2, MapProblem> {
-    let wanted = "a list of three finite numbers: x, y, yaw";
+    let wanted = "a list of three finite numbers: x, y (up to 1e8 m), yaw";
+    let near = |number: f64| number.abs() <= FARTHEST_M;
     let Value::List(items) = &entry.value else { return Err(bad("origin", entry, wanted)) };
     let numbers: Vec<f64> = items.iter().filter_map(|item| item.parse().ok()).collect();
     match (numbers.as_slice(), items.len()) {
-        (&[x_m, y_m, yaw], 3) if x_m.is_finite() && y_m.is_finite() && yaw.is_finite() => {
-            Ok(Pose2::new(x_m, y_m, yaw))
-        }
+        (&[x_m, y_m, yaw], 3) if near(x_m) && near(y_m) && near(yaw) => Ok(Pose2::new(x_m, y_m, yaw)),
         _ => Err(bad("origin", entry, wanted)),
     }
 }
@@ -250,134 +316,48 @@ fn origin(entry: &Entry) -> Result<Pose2, MapProblem> {
 impl OccupancyGrid {
     /// Reads the map that a YAML file describes, with its image.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, MapError> {
-        let yaml = path.as_ref();
-        let text = std::fs::read_to_string(yaml).map_err(at(yaml))?;
-        let header = MapHeader::parse(&text).map_err(at(yaml))?;
-        let image = yaml.parent().unwrap_or(Path::new("")).join(&header.image);
-        let pixels = read_image(&image).map_err(at(&image))?;
-        Self::from_image(&header, &pixels).map_err(at(&image))
+        let (header, mut image) = open(path.as_ref())?;
+        image_file::cells(&header, &mut image.reader)
+            .map_err(|problem| MapError { path: image.path, problem })
     }
 
-    fn from_image(header: &MapHeader, image: &DynamicImage) -> Result<Self, MapProblem> {
-        let (width, height) = (image.width(), image.height());
-        let frame = GridFrame::new(width, height, header.resolution_m, header.origin)?;
-        // Images of one byte a pixel, which nearly all maps are, need no other copy.
-        let mut cells = Vec::with_capacity(frame.len());
-        if let DynamicImage::ImageLuma8(grey) = image {
-            let meanings: Vec<_> = (0..=255).map(|v| header.occupancy(f64::from(v) / 255.0, 1.0)).collect();
-            for row in grey.as_raw().chunks_exact(width as usize).rev() {
-                cells.extend(row.iter().map(|&value| meanings[usize::from(value)]));
-            }
-        } else {
-            let full = f64::from(u16::MAX);
-            let grey = image.to_luma_alpha16();
-            for row in grey.as_raw().chunks_exact(2 * width as usize).rev() {
-                cells.extend(
-                    row.chunks_exact(2).map(|pixel| {
-                        header.occupancy(f64::from(pixel[0]) / full, f64::from(pixel[1]) / full)
-                    }),
-                );
-            }
+    /// How large the map is that a YAML file describes, and where it lies. Reads no pixels: what is wrong
+    /// with the YAML, and an image that is not there, too large or of an unknown kind, is found as by
+    /// [`OccupancyGrid::load`].
+    pub fn look(path: impl AsRef<Path>) -> Result<GridFrame, MapError> {
+        let (header, mut image) = open(path.as_ref())?;
+        image_file::frame(&header, &mut image.reader)
+            .map_err(|problem| MapError { path: image.path, problem })
+    }
+}
+
+struct Image {
+    path: PathBuf,
+    reader: std::io::BufReader<std::fs::File>,
+}
+
+fn open(yaml: &Path) -> Result<(MapHeader, Image), MapError> {
+    let text = files::read_text(yaml, YAML_MAX)?;
+    let header = MapHeader::parse(&text).map_err(|problem| MapError { path: yaml.to_owned(), problem })?;
+    let path = yaml.parent().unwrap_or(Path::new("")).join(&header.image);
+    let named = header.image.to_string_lossy();
+    let hint = if named.starts_with('~') {
+        "; `~` is no home there: write the whole path"
+    } else if named.contains("://") {
+        "; only paths are understood, no addresses"
+    } else {
+        ""
+    };
+    match files::open(&path, image_file::FILE_MAX) {
+        Ok(file) => Ok((header, Image { path, reader: std::io::BufReader::with_capacity(1 << 16, file) })),
+        Err(FileError { path, problem }) => {
+            Err(MapError { path, problem: MapProblem::Named { yaml: yaml.to_owned(), problem, hint } })
         }
-        Ok(Self::new(frame, cells)?)
-    }
-
-    /// Writes the map as a YAML file and, beside it, an image of the same name with the extension `pgm` or `png`. What was
-    /// there before is replaced.
-    ///
-    /// Trinary maps hold cells of 0, 100 and unknown only, scaled maps need PNG for unknown cells; raw maps hold everything.
-    pub fn save(&self, yaml: impl AsRef<Path>, mode: MapMode, image: MapImage) -> Result<(), MapError> {
-        let yaml = yaml.as_ref();
-        let extension = match image {
-            MapImage::Pgm => "pgm",
-            MapImage::Png => "png",
-        };
-        let image_path = yaml.with_extension(extension);
-        let name = image_path.file_name().unwrap_or_default();
-        // In trinary maps the usual grey of unknown cells, 205, lies just above this free_thresh. Scaled maps use the whole
-        // range between black and white.
-        let (occupied_thresh, free_thresh) = match mode {
-            MapMode::Trinary => (0.65, 0.196),
-            MapMode::Scale | MapMode::Raw => (1.0, 0.0),
-        };
-        let header = MapHeader {
-            image: name.into(),
-            resolution_m: self.frame().resolution_m(),
-            origin: self.frame().origin(),
-            negate: false,
-            mode,
-            occupied_thresh,
-            free_thresh,
-        };
-        let pixels = self.to_image(mode, image).map_err(at(yaml))?;
-        let write = || -> Result<(), MapProblem> {
-            let mut file = BufWriter::new(File::create(&image_path)?);
-            match image {
-                MapImage::Pgm => {
-                    let grey = PnmSubtype::Graymap(SampleEncoding::Binary);
-                    pixels.write_with_encoder(PnmEncoder::new(&mut file).with_subtype(grey))?;
-                }
-                MapImage::Png => pixels.write_to(&mut file, ImageFormat::Png)?,
-            }
-            Ok(std::io::Write::flush(&mut file)?)
-        };
-        write().map_err(at(&image_path))?;
-        std::fs::write(yaml, header.to_yaml()).map_err(at(yaml))
-    }
-
-    fn to_image(&self, mode: MapMode, image: MapImage) -> Result<DynamicImage, MapProblem> {
-        let (width, height) = (self.frame().width(), self.frame().height());
-        let with_alpha = mode == MapMode::Scale && image == MapImage::Png;
-        let mut bytes = Vec::with_capacity(self.frame().len() * if with_alpha { 2 } else { 1 });
-        for row in (0..height).rev() {
-            let begin = row as usize * width as usize;
-            for (column, &value) in (0..width).zip(&self.as_slice()[begin..]) {
-                let refuse = |wanted| Err(MapProblem::Inexpressible { column, row, value, wanted });
-                match (mode, value.percent()) {
-                    (MapMode::Trinary, Some(0)) => bytes.push(254),
-                    (MapMode::Trinary, Some(100)) => bytes.push(0),
-                    (MapMode::Trinary, None) => bytes.push(205),
-                    (MapMode::Trinary, Some(_)) => return refuse("a trinary map cannot hold"),
-                    (MapMode::Scale, None) if with_alpha => bytes.extend([0, 0]),
-                    (MapMode::Scale, None) => return refuse("a scaled map holds as PNG only"),
-                    (MapMode::Scale, Some(percent)) => {
-                        // Brightness in 255 steps tells all 101 values apart.
-                        bytes.push((255.0 - 2.55 * f64::from(percent)).round() as u8);
-                        bytes.extend(with_alpha.then_some(255));
-                    }
-                    (MapMode::Raw, percent) => bytes.push(percent.unwrap_or(255)),
-                }
-            }
-        }
-        let pixels = if with_alpha {
-            GrayAlphaImage::from_raw(width, height, bytes).map(DynamicImage::from)
-        } else {
-            GrayImage::from_raw(width, height, bytes).map(DynamicImage::from)
-        };
-        pixels.ok_or(MapProblem::Grid(GridError::BadSize { width, height }))
     }
 }
 
-/// Says which file a problem is in.
-fn at<P: Into<MapProblem>>(path: &Path) -> impl Fn(P) -> MapError {
-    move |problem| MapError { path: path.to_owned(), problem: problem.into() }
-}
-
-fn read_image(path: &Path) -> Result<DynamicImage, MapProblem> {
-    let reader = ImageReader::open(path)?.with_guessed_format()?;
-    let decoder = reader.into_decoder()?;
-    let (width, height) = decoder.dimensions();
-    if u64::from(width) * u64::from(height) > MOST_CELLS {
-        return Err(GridError::BadSize { width, height }.into());
+impl From<FileError> for MapError {
+    fn from(error: FileError) -> Self {
+        Self { path: error.path, problem: error.problem.into() }
     }
-    Ok(DynamicImage::from_decoder(decoder)?)
-}
-
-/// The kind of image to write.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MapImage {
-    /// Grey, without compression.
-    Pgm,
-    /// Compressed.
-    Png,
 }

@@ -1,10 +1,11 @@
 //! World files: floor plans, arenas, furniture and walkers, as TOML.
 //!
-//! One file serves everybody: the simulator casts rays into it, the planners read its walls and areas, the localiser its tag
-//! anchors, the launcher's view draws it. A complete, commented example lies in `tests/example-world.toml` of this crate.
+//! One file serves everybody: the simulator casts rays into it, the planners read its walls and areas, the
+//! localiser its tag anchors, the launcher's view draws it. A complete, commented example lies in
+//! `tests/example-world.toml` of this crate.
 //!
-//! Frame: one right-handed plane for all floors (x and y of an elevator shaft agree on each), z up from the floor in
-//! question. Metres, radians, seconds.
+//! Frame: one right-handed plane for all floors (x and y of an elevator shaft agree on each), z up from the
+//! floor in question. Metres, radians, seconds.
 
 mod check;
 mod door;
@@ -20,11 +21,15 @@ pub use items::{
 pub use scene::{WorldBodies, WorldScene};
 
 use crate::{Pose2, Segment};
+use files::{FileError, FileProblem};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// A building, or a single arena: everything that does not depend on time. What moves (door leaves, walkers) is described
-/// by how it moves; [`Door::opening_fraction`] and [`Walker::pose`] say where it is.
+/// The largest building of ours has 11 KiB, and one with as much of everything as is allowed has 1.5 MiB.
+const FILE_MAX: u64 = 2 << 20;
+
+/// A building, or a single arena: everything that does not depend on time. What moves (door leaves, walkers)
+/// is described by how it moves; [`Door::opening_fraction`] and [`Walker::pose`] say where it is.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct World {
@@ -67,8 +72,8 @@ pub enum WorldError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
-        cause: std::io::Error,
+        /// Why.
+        cause: FileProblem,
     },
     /// The text is no TOML, or a field is missing, unknown or of the wrong type.
     #[error("{}line {line}, column {column}: {message}", in_file(path.as_deref()))]
@@ -106,6 +111,28 @@ pub enum WorldProblem {
     /// A world without a floor.
     #[error("a world needs at least one [[floor]]")]
     NoFloor,
+    /// More of something than a world may hold.
+    #[error(
+        "{count} {what} are more than the {most} that a world may hold; leave out what this robot does not meet"
+    )]
+    TooMany {
+        /// What, in words.
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+        /// How many there may be.
+        most: usize,
+    },
+    /// A start or place that no robot within the outline is at.
+    #[error("({x_m}, {y_m}) lies outside of the outline of floor {floor}")]
+    OutsideOutline {
+        /// The floor's number.
+        floor: i32,
+        /// The place.
+        x_m: f64,
+        /// The place.
+        y_m: f64,
+    },
     /// Two things of a kind bear one name or number.
     #[error("{what} is already taken by an earlier entry")]
     Duplicate {
@@ -204,13 +231,14 @@ impl World {
     /// Reads and checks a world file.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, WorldError> {
         let file = path.as_ref();
-        let text = std::fs::read_to_string(file)
-            .map_err(|cause| WorldError::Unreadable { path: file.to_owned(), cause })?;
+        let text = files::read_text(file, FILE_MAX)
+            .map_err(|FileError { path, problem }| WorldError::Unreadable { path, cause: problem })?;
         Self::parse(&text).map_err(|error| error.in_path(file))
     }
 
-    /// Refuses nonsense: unknown floors, equal names, doors outside walls, numbers that are not finite or not positive.
-    /// [`World::parse`] and [`World::load`] have done so already; a world built in code has to be checked.
+    /// Refuses nonsense: unknown floors, equal names, doors outside walls, numbers that are not finite or not
+    /// positive. [`World::parse`] and [`World::load`] have done so already; a world built in code has to be
+    /// checked.
     pub fn check(&self) -> Result<(), WorldError> {
         self.find_problem().map_or(Ok(()), |found| {
             Err(WorldError::Nonsense { path: None, line: 0, item: found.item, problem: found.problem })
@@ -248,8 +276,8 @@ impl World {
         self.areas.iter().filter(move |area| area.floor == floor && kind.is_none_or(|kind| area.kind == kind))
     }
 
-    /// The exact lines of a door: gap, jambs, recessed leaf and room. `None` when no wall holds the door, which
-    /// [`World::check`] refuses.
+    /// The exact lines of a door: gap, jambs, recessed leaf and room. `None` when no wall holds the door,
+    /// which [`World::check`] refuses.
     pub fn door_geometry(&self, door: &Door) -> Option<DoorGeometry> {
         DoorGeometry::cut(self.floor(door.floor)?, &door.opening())
     }
@@ -260,8 +288,8 @@ impl World {
         if stops { DoorGeometry::cut(self.floor(floor)?, &elevator.opening()) } else { None }
     }
 
-    /// Everything on a floor that stands still and reaches from floor to ceiling: walls with gaps where doors are, jambs, and
-    /// the rooms behind the doors. Door leaves are not among it.
+    /// Everything on a floor that stands still and reaches from floor to ceiling: walls with gaps where doors
+    /// are, jambs, and the rooms behind the doors. Door leaves are not among it.
     pub fn wall_segments(&self, floor: i32) -> Vec<Segment> {
         let Some(plan) = self.floor(floor) else { return Vec::new() };
         let openings: Vec<_> = self.openings_of(floor).collect();

@@ -11,6 +11,7 @@ use std::time::Duration;
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// The world file with walls, doors and marked areas; without one nothing is ever measured.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// Whether to measure also along every wall that the world file shows free of doors, not only in its marked areas (X-2A).
     pub generate_areas: bool,

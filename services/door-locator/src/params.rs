@@ -11,6 +11,7 @@ use std::time::Duration;
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// The world file with the doors; without one no door is ever found.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// Only the paper's sliding window decides; otherwise the edges of the door are located as well, which is earlier and finer.
     pub strict_paper: bool,

@@ -10,6 +10,7 @@ use std::time::Duration;
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// The world file, relative to the working directory; empty for none, and then the robot stays where it is.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// The target: a place of the world file.
     pub target: String,

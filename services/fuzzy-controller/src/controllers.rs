@@ -2,6 +2,11 @@
 
 use crate::fuzzy::{Engine, EngineError, Options, System, fcl};
 use crate::params::{Params, ParamsError};
+use files::FileError;
+use std::path::Path;
+
+/// A rule file of a thousand rules has 100 KiB.
+const RULES_MAX: u64 = 1 << 20;
 
 const MOTION: &str = include_str!("../fcl/motion.fcl");
 const AVOIDANCE: &str = include_str!("../fcl/avoidance.fcl");
@@ -20,13 +25,8 @@ pub enum SetupError {
     #[error("world: {0}")]
     World(#[from] geometry::WorldError),
     /// A rule file that cannot be read from the disk.
-    #[error("{file}: {source}")]
-    Unreadable {
-        /// The file.
-        file: String,
-        /// Why.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Unreadable(#[from] FileError),
     /// A rule file that is no FCL.
     #[error("{file}: {source}")]
     Rules {
@@ -80,11 +80,7 @@ impl<const N: usize> Controller<N> {
         let (file, text) = if path.is_empty() {
             (built_in_name.to_string(), built_in.to_string())
         } else {
-            let file = path.to_string();
-            match std::fs::read_to_string(path) {
-                Ok(text) => (file, text),
-                Err(source) => return Err(SetupError::Unreadable { file, source }),
-            }
+            (path.to_string(), files::read_text(Path::new(path), RULES_MAX)?)
         };
         let system = fcl::read(&text).map_err(|source| SetupError::Rules { file: file.clone(), source })?;
         let (order, places) = match (input_order(&system, inputs), output_places(&system)) {
@@ -108,7 +104,8 @@ impl<const N: usize> Controller<N> {
         Ok(Self { engine, order, left: places[0], right: places[1] })
     }
 
-    /// The wheel speeds for the inputs in the order of the controller's definition; NaN if the rules are silent.
+    /// The wheel speeds for the inputs in the order of the controller's definition; NaN if the rules are
+    /// silent.
     pub(crate) fn step(&mut self, values: [f64; N]) -> Wheels {
         let ordered = self.order.map(|index| values[index]);
         let outputs = self.engine.step(&ordered);

@@ -25,6 +25,7 @@ pub enum RangeSource {
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// World file whose walls the hull keeps away from, as from what was seen; empty for none.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// Distance between the wheels, in metres.
     #[schemars(range(min = 0.05, max = 5.0))]
@@ -122,10 +123,13 @@ pub struct Params {
     #[schemars(range(min = 0.01, max = 5.0))]
     pub hull_side_m: f64,
     /// A file with the motion controller's rules in FCL; empty for the built-in ones.
+    #[schemars(extend("format" = "path"))]
     pub motion_rules: String,
     /// A file with the avoidance controller's rules in FCL; empty for the built-in ones.
+    #[schemars(extend("format" = "path"))]
     pub avoidance_rules: String,
     /// A file with the rotation controller's rules in FCL; empty for the built-in ones.
+    #[schemars(extend("format" = "path"))]
     pub rotation_rules: String,
 }
 

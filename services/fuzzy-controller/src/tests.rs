@@ -436,6 +436,7 @@ fn bad_setup_is_refused() {
         "brake_distance_m = 0.6 must be below front_trigger_m = 0.5",
     );
     check_refused(Params { motion_rules: "/no/such/file.fcl".into(), ..params() }, "/no/such/file.fcl: ");
+    check_refused(Params { motion_rules: "/dev/zero".into(), ..params() }, "/dev/zero: this is a device");
 }
 
 #[test]
@@ -450,6 +451,9 @@ fn broken_rule_files_are_refused_with_their_place() {
         Params { motion_rules: path.clone(), ..params() }
     };
     assert!(FuzzyController::new(with(good.to_string())).is_ok());
+    std::fs::write(&file, b"(* caf\xe9 *)").unwrap();
+    let latin = Params { motion_rules: path.clone(), ..params() };
+    check_refused(latin, "motion.fcl: line 1, byte 7: the byte 0xe9 is no UTF-8");
     check_refused(
         with(good.replacen("TERM VH := 0.47", "TERM VH = 0.47", 1)),
         "motion.fcl: line 43, column 11: ",

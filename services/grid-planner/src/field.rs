@@ -1,15 +1,21 @@
-//! Where the middle of the robot may be, what each step there costs, and how both change with obstacles that come and go.
+//! Where the middle of the robot may be, what each step there costs, and how both change with obstacles that
+//! come and go.
 
 use crate::grid::Grid;
 use crate::lane;
 use crate::line;
+use std::collections::HashMap;
 
 /// Sixteenths: an extra cost of 16 doubles the cost of a step.
 const SIXTEENTHS: f32 = 16.0;
 
-/// Around an observed obstacle this much more room costs: not as much as beside walls, as what stands on the other side may not be
-/// seen yet.
+/// Around an observed obstacle this much more room costs: not as much as beside walls, as what stands on the
+/// other side may not be seen yet.
 const OBSTACLE_BAND_M: f64 = 0.10;
+
+/// Around an observed obstacle no cells farther away than this change: each obstacle that comes or goes costs
+/// as many as the square.
+const REACH_MAX: f64 = 400.0;
 
 /// What decides where the robot may be and what it costs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +36,34 @@ pub struct Costs {
     pub clearance_m: f64,
 }
 
+/// A wall is there, or is too near.
+const BY_WALLS: u8 = 1;
+/// An observed obstacle is too near.
+const BY_OBSTACLES: u8 = 2;
+
+/// A cell near observed obstacles.
+#[derive(Debug, Clone, Copy, Default)]
+struct Touched {
+    /// How many are too near.
+    taken: u16,
+    /// How many are near enough to cost, and how many are nearer than half of that.
+    near: [u16; 2],
+    /// What steps into it cost without them.
+    walls_extra: [u8; 8],
+}
+
+impl Costs {
+    /// Whether what an observed obstacle changes around it is few enough cells of this size.
+    pub(crate) fn are_fit_for(&self, resolution_m: f64) -> bool {
+        self.obstacle_reach_m() / resolution_m <= REACH_MAX
+    }
+
+    /// How far from an observed obstacle cells cost, in metres.
+    pub(crate) fn obstacle_reach_m(&self) -> f64 {
+        self.robot_radius_m + self.obstacle_margin_m + OBSTACLE_BAND_M
+    }
+}
+
 /// The inflated grid of a floor with the costs of its steps.
 #[derive(Debug, Clone)]
 pub struct Field {
@@ -39,17 +73,14 @@ pub struct Field {
     robot_radius_m: f64,
     has_costs: bool,
     clearance_weight: f64,
-    /// Walls, and everything too near to them.
-    inflated: Vec<bool>,
-    /// How many observed obstacles are too near.
-    taken: Vec<u16>,
-    /// How many observed obstacles are near enough to cost, and how many are nearer than half of that.
-    near: [Vec<u16>; 2],
+    /// What blocks each cell: `BY_WALLS`, `BY_OBSTACLES`.
+    blocked: Vec<u8>,
     /// Which of the eight moves are open in each cell.
     moves: Vec<u8>,
     /// What steps into a cell cost in addition, by direction, in sixteenths; empty without costs.
     extra: Vec<[u8; 8]>,
-    walls_extra: Vec<[u8; 8]>,
+    /// Around observed obstacles: what has become of the cells. Of a building there are few.
+    touched: HashMap<usize, Touched>,
     /// Cells around an observed obstacle that are taken, and those beyond that are near.
     taken_disc: Vec<(i32, i32)>,
     near_discs: [Vec<(i32, i32)>; 2],
@@ -60,11 +91,12 @@ impl Field {
     pub fn new(grid: Grid, costs: &Costs) -> Self {
         let wall_m: Vec<f32> =
             grid.distances().into_iter().map(|cells| cells * grid.resolution_m() as f32).collect();
-        let inflated: Vec<bool> = (0..grid.len())
-            .map(|cell| grid.is_occupied(cell) || f64::from(wall_m[cell]) < costs.robot_radius_m)
-            .collect();
+        let is_inflated =
+            |cell: usize| grid.is_occupied(cell) || f64::from(wall_m[cell]) < costs.robot_radius_m;
+        let blocked: Vec<u8> =
+            (0..grid.len()).map(|cell| if is_inflated(cell) { BY_WALLS } else { 0 }).collect();
         let has_costs = costs.keep_right_weight > 0.0 || costs.clearance_weight > 0.0;
-        let walls_extra = if has_costs { extras(&grid, &wall_m, costs) } else { Vec::new() };
+        let extra = if has_costs { extras(&grid, &wall_m, costs) } else { Vec::new() };
         let taken_m = costs.robot_radius_m + costs.obstacle_margin_m;
         let near_m = taken_m + OBSTACLE_BAND_M;
         let taken_disc = disc(0.0, taken_m, grid.resolution_m());
@@ -72,16 +104,14 @@ impl Field {
         let near_discs = [middle_m, near_m].map(|to_m| disc(taken_m, to_m, grid.resolution_m()));
         let mut field = Self {
             moves: vec![0; grid.len()],
-            taken: vec![0; grid.len()],
-            near: [vec![0; grid.len()], vec![0; grid.len()]],
-            extra: walls_extra.clone(),
+            extra,
+            touched: HashMap::new(),
             robot_radius_m: costs.robot_radius_m,
             clearance_weight: costs.clearance_weight,
             grid,
             wall_m,
             has_costs,
-            inflated,
-            walls_extra,
+            blocked,
             taken_disc,
             near_discs,
         };
@@ -128,7 +158,7 @@ impl Field {
 
     /// Whether the robot's middle may not be in a cell, because of walls or of observed obstacles.
     pub fn is_blocked(&self, cell: usize) -> bool {
-        self.inflated[cell] || self.taken[cell] > 0
+        self.blocked[cell] != 0
     }
 
     /// Distance from a cell's middle to the nearest wall, in metres.
@@ -146,7 +176,8 @@ impl Field {
         &self.extra
     }
 
-    /// Cost of driving straight from one point to another, in units of cells; `None` when it touches a blocked cell.
+    /// Cost of driving straight from one point to another, in units of cells; `None` when it touches a
+    /// blocked cell.
     pub fn line_cost(&self, from: [f64; 2], to: [f64; 2]) -> Option<f64> {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let length = dx.hypot(dy);
@@ -178,20 +209,37 @@ impl Field {
             let (dx, dy) = self.taken_disc[at];
             reach = reach.max(i64::from(dy));
             if let Some(other) = self.grid.checked_index(column + i64::from(dx), row + i64::from(dy)) {
-                count(&mut self.taken[other], present);
+                self.touch(other, |touched| count(&mut touched.taken, present));
             }
         }
         for ring in 0..self.near_discs.len() {
             for at in 0..self.near_discs[ring].len() {
                 let (dx, dy) = self.near_discs[ring][at];
                 if let Some(other) = self.grid.checked_index(column + i64::from(dx), row + i64::from(dy)) {
-                    count(&mut self.near[ring][other], present);
-                    self.update_extra(other);
+                    self.touch(other, |touched| count(&mut touched.near[ring], present));
                 }
             }
         }
         for other_row in row - reach - 1..=row + reach + 1 {
             self.update_moves(other_row, column - reach - 1, column + reach + 1);
+        }
+    }
+
+    /// Changes what obstacles do to a cell.
+    fn touch(&mut self, cell: usize, change: impl Fn(&mut Touched)) {
+        let walls_extra = self.extra.get(cell).copied().unwrap_or_default();
+        let touched = self.touched.entry(cell).or_insert(Touched { walls_extra, ..Touched::default() });
+        change(touched);
+        let Touched { taken, near, walls_extra } = *touched;
+        self.blocked[cell] &= !BY_OBSTACLES;
+        self.blocked[cell] |= if taken > 0 { BY_OBSTACLES } else { 0 };
+        if let Some(extra) = self.extra.get_mut(cell) {
+            let rings = near.iter().filter(|&&ring| ring > 0).count();
+            let beside = self.clearance_weight as f32 * 0.25 * rings as f32 * SIXTEENTHS;
+            *extra = walls_extra.map(|walls| walls.saturating_add(beside as u8));
+        }
+        if taken == 0 && near == [0, 0] {
+            self.touched.remove(&cell);
         }
     }
 
@@ -217,22 +265,14 @@ impl Field {
             self.moves[cell] = open;
         }
     }
-
-    fn update_extra(&mut self, cell: usize) {
-        if !self.has_costs {
-            return;
-        }
-        let rings = self.near.iter().filter(|ring| ring[cell] > 0).count();
-        let beside = self.clearance_weight as f32 * 0.25 * rings as f32 * SIXTEENTHS;
-        self.extra[cell] = self.walls_extra[cell].map(|walls| walls.saturating_add(beside as u8));
-    }
 }
 
 fn count(value: &mut u16, present: bool) {
     *value = if present { value.saturating_add(1) } else { value.saturating_sub(1) };
 }
 
-/// The cells whose middles lie at `from_m` or farther, and nearer than `to_m`; the first disc holds its own middle.
+/// The cells whose middles lie at `from_m` or farther, and nearer than `to_m`; the first disc holds its own
+/// middle.
 fn disc(from_m: f64, to_m: f64, resolution_m: f64) -> Vec<(i32, i32)> {
     let reach = (to_m / resolution_m).ceil() as i32;
     let cells = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
@@ -246,21 +286,20 @@ fn disc(from_m: f64, to_m: f64, resolution_m: f64) -> Vec<(i32, i32)> {
 
 /// The extra cost of steps by direction: for leaving the lane, and for nearness to walls.
 fn extras(grid: &Grid, wall_m: &[f32], costs: &Costs) -> Vec<[u8; 8]> {
-    let lanes = (costs.keep_right_weight > 0.0)
-        .then(|| lane::beside_lane(grid, costs.lane_m, costs.hallway_width_max_m));
     let band_m = (costs.clearance_m - costs.robot_radius_m).max(grid.resolution_m());
-    (0..grid.len())
-        .map(|cell| {
-            let missing_m = (costs.clearance_m - f64::from(wall_m[cell])).clamp(0.0, band_m);
-            let close = costs.clearance_weight * missing_m / band_m;
-            let mut row = [0; 8];
-            for (direction, extra) in row.iter_mut().enumerate() {
-                let beside_m = lanes.as_ref().map_or(0.0, |lanes| f64::from(lanes[cell][direction]));
-                let all = costs.keep_right_weight * beside_m + close;
-                // The conversion saturates: far beyond any sensible weight.
-                *extra = (all as f32 * SIXTEENTHS).round() as u8;
-            }
-            row
-        })
-        .collect()
+    let close = |cell: usize| {
+        let missing_m = (costs.clearance_m - f64::from(wall_m[cell])).clamp(0.0, band_m);
+        costs.clearance_weight * missing_m / band_m
+    };
+    // The conversion saturates: far beyond any sensible weight.
+    let sixteenths = |all: f64| (all as f32 * SIXTEENTHS).round() as u8;
+    let mut extra: Vec<[u8; 8]> = (0..grid.len()).map(|cell| [sixteenths(close(cell)); 8]).collect();
+    if costs.keep_right_weight > 0.0 {
+        lane::beside_lane(grid, costs.lane_m, costs.hallway_width_max_m, |cell, beside_m| {
+            let close = close(cell);
+            extra[cell] =
+                beside_m.map(|beside_m| sixteenths(costs.keep_right_weight * f64::from(beside_m) + close));
+        });
+    }
+    extra
 }

@@ -1,6 +1,8 @@
-//! An occupancy grid as a flat array with a border of one occupied cell, so that no neighbour needs a bounds check.
+//! An occupancy grid as a flat array with a border of one occupied cell, so that no neighbour needs a bounds
+//! check.
 
 use crate::line;
+use geometry::{GridFrame, Pose2};
 
 /// The eight directions of a step, counter-clockwise from +x: even ones are straight, odd ones diagonal.
 pub const DIRECTIONS: [(i32, i32); 8] =
@@ -33,7 +35,8 @@ impl Grid {
         grid
     }
 
-    /// A grid around pieces of wall `[x, y]` to `[x, y]`, with `margin_m` to spare on each side. Pieces that are not finite are left out.
+    /// A grid around pieces of wall `[x, y]` to `[x, y]`, with `margin_m` to spare on each side. Pieces that
+    /// are not finite are left out.
     pub fn from_segments(segments: &[[[f64; 2]; 2]], resolution_m: f64, margin_m: f64) -> Self {
         let finite = || segments.iter().filter(|piece| piece.iter().flatten().all(|value| value.is_finite()));
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
@@ -64,6 +67,14 @@ impl Grid {
     pub fn occupy(&mut self, column: i64, row: i64) {
         if let Some(index) = self.checked_index(column, row) {
             self.occupied[index] = 1;
+        }
+    }
+
+    /// Marks the cells of a row whose values are occupied.
+    pub(crate) fn occupy_where<T>(&mut self, row: usize, values: &[T], is_occupied: impl Fn(&T) -> bool) {
+        let first = self.index(0, row);
+        for (cell, value) in self.occupied[first..first + self.width].iter_mut().zip(values) {
+            *cell |= u8::from(is_occupied(value));
         }
     }
 
@@ -155,67 +166,23 @@ impl Grid {
         DIRECTIONS.map(|(dx, dy)| dy as isize * self.stride() as isize + dx as isize)
     }
 
-    /// Distance from each cell's middle to the middle of the nearest occupied cell, in cells, exact; the border does not count.
-    /// Two passes of lower envelopes (Felzenszwalb and Huttenlocher 2012, "Distance transforms of sampled functions").
+    /// Distance from each cell's middle to the middle of the nearest occupied cell, in cells, exact; the
+    /// border does not count. Where nothing is occupied at all, farther than any grid reaches.
     pub fn distances(&self) -> Vec<f32> {
-        const FAR: f64 = 1e12;
-        let longest = self.width.max(self.height);
-        let mut squares = vec![FAR; self.len()];
-        let mut line = vec![0.0; longest];
-        let mut envelope = Envelope::default();
-        for column in 0..self.width {
-            for (row, value) in line[..self.height].iter_mut().enumerate() {
-                *value = if self.is_occupied(self.index(column, row)) { 0.0 } else { FAR };
-            }
-            envelope.transform(&line[..self.height], |row, value| squares[self.index(column, row)] = value);
-        }
-        for row in 0..self.height {
+        const FAR: f32 = 1e6;
+        let mut all = vec![FAR; self.len()];
+        let (width, height) = (self.width as u32, self.height as u32);
+        let Ok(frame) = GridFrame::new(width, height, 1.0, Pose2::IDENTITY) else { return all };
+        let inner = self.occupied.chunks_exact(self.stride()).skip(1).take(self.height);
+        let inner: Vec<u8> = inner.flat_map(|row| &row[1..=self.width]).copied().collect();
+        let Ok(inner) = geometry::Grid::new(frame, inner) else { return all };
+        let distances = inner.distances_to_m(|&occupied| occupied != 0);
+        for (row, distances) in distances.as_slice().chunks_exact(self.width).enumerate() {
             let first = self.index(0, row);
-            line[..self.width].copy_from_slice(&squares[first..first + self.width]);
-            envelope.transform(&line[..self.width], |column, value| squares[first + column] = value);
-        }
-        squares.into_iter().map(|square| square.sqrt() as f32).collect()
-    }
-}
-
-/// The lower envelope of parabolas along one line.
-#[derive(Debug, Default)]
-struct Envelope {
-    /// Where each parabola of the envelope has its lowest point.
-    lowest: Vec<usize>,
-    /// Where each begins to be the lowest of all.
-    begins: Vec<f64>,
-}
-
-impl Envelope {
-    fn transform(&mut self, heights: &[f64], mut write: impl FnMut(usize, f64)) {
-        self.lowest.clear();
-        self.begins.clear();
-        for (place, &height) in heights.iter().enumerate() {
-            let crossing = |other: usize| {
-                let (p, q) = (place as f64, other as f64);
-                (height + p * p - heights[other] - q * q) / (2.0 * (p - q))
-            };
-            let mut begin = f64::NEG_INFINITY;
-            while let (Some(&last), Some(&last_begin)) = (self.lowest.last(), self.begins.last()) {
-                begin = crossing(last);
-                if begin > last_begin {
-                    break;
-                }
-                self.lowest.pop();
-                self.begins.pop();
-                begin = f64::NEG_INFINITY;
+            for (cell, distance) in all[first..first + self.width].iter_mut().zip(distances) {
+                *cell = distance.min(FAR);
             }
-            self.lowest.push(place);
-            self.begins.push(begin);
         }
-        let mut piece = 0;
-        for place in 0..heights.len() {
-            while self.begins.get(piece + 1).is_some_and(|&begin| begin < place as f64) {
-                piece += 1;
-            }
-            let away = place as f64 - self.lowest[piece] as f64;
-            write(place, heights[self.lowest[piece]] + away * away);
-        }
+        all
     }
 }

@@ -1,5 +1,6 @@
-//! Plans paths on the inflated grid of a floor: A* over eight neighbours, straightened to any angle, to the right in hallways by cost
-//! (COF-006, ASN-130..134). Obstacles that the time-of-flight sensors see enter the grid; a path that they block is planned anew.
+//! Plans paths on the inflated grid of a floor: A* over eight neighbours, straightened to any angle, to the
+//! right in hallways by cost (COF-006, ASN-130..134). Obstacles that the time-of-flight sensors see enter the
+//! grid; a path that they block is planned anew.
 
 mod field;
 mod floors;
@@ -72,8 +73,23 @@ pub struct GridPlanner {
 }
 
 impl GridPlanner {
-    /// Reads the world or the map that the parameters name; without either there is no floor, and every request is answered by
-    /// `NoStart`.
+    /// Whether the world or the map that the parameters name can be used; of a map only the head is read.
+    ///
+    /// # Errors
+    /// When a parameter or a file cannot be used.
+    pub fn check(params: &Params) -> Result<(), ParamsError> {
+        params.check()?;
+        if !params.map.is_empty() {
+            floors::check_map(params)
+        } else if !params.world.is_empty() {
+            floors::check_world(&World::load(&params.world)?, params)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Reads the world or the map that the parameters name; without either there is no floor, and every
+    /// request is answered by `NoStart`.
     ///
     /// # Errors
     /// When a parameter or a file cannot be used.
@@ -113,7 +129,8 @@ impl GridPlanner {
         })
     }
 
-    /// Takes new readings into the grid, and plans when a request is new, its path is blocked, or the robot has strayed.
+    /// Takes new readings into the grid, and plans when a request is new, its path is blocked, or the robot
+    /// has strayed.
     pub fn step(&mut self, now: Time, inputs: Inputs<'_>) -> Outputs<'_> {
         let pose = inputs.pose.and_then(|pose| {
             let fresh = pose.fresh(now, self.params.input_max_age())?;
@@ -190,8 +207,8 @@ impl GridPlanner {
         away_m > self.params.stray_m || self.is_blocked(field, &waypoints[piece..], pose)
     }
 
-    /// Whether an observed obstacle meets the path from the robot on. What is blocked right where the robot stands is left to the
-    /// collision guard: no path could avoid it.
+    /// Whether an observed obstacle meets the path from the robot on. What is blocked right where the robot
+    /// stands is left to the collision guard: no path could avoid it.
     fn is_blocked(&self, field: &Field, ahead: &[Waypoint], pose: Pose2) -> bool {
         let grid = field.grid();
         let mut from = grid.to_cells([pose.x_m, pose.y_m]);

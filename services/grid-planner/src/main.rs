@@ -11,6 +11,8 @@ fn main() -> ExitCode {
         let mut path = node.publisher::<Path>("plan/path")?;
         node.wake_on(&request);
         node.every(params.period());
+        GridPlanner::check(&params)?;
+        node.declared()?;
         let mut planner = GridPlanner::new(params)?;
         Ok(move |now| {
             let inputs = Inputs { request: request.read(), pose: pose.read(), ranges: ranges.read() };

@@ -23,12 +23,15 @@ pub enum Algorithm {
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// World file with the floors' walls; empty for none.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// ROS map file (YAML) used instead of a world; empty for none.
+    #[schemars(extend("format" = "path"))]
     pub map: String,
     /// The floor that the map file shows.
     pub map_floor: i32,
-    /// A map's cell is free when its freeness (0 occupied, 0.5 unknown, 1 free) is above this (ASN Table 1, X-31).
+    /// A map's cell is free when its freeness (0 occupied, 0.5 unknown, 1 free) is above this (ASN Table 1,
+    /// X-31).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub occupancy_threshold: f64,
     /// How paths are searched.
@@ -42,7 +45,8 @@ pub struct Params {
     /// Observed obstacles are kept farther away than walls by this much.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub obstacle_margin_m: f64,
-    /// Extra cost per metre for each metre beside the lane on the right of a hallway (COF-006); zero for no lanes.
+    /// Extra cost per metre for each metre beside the lane on the right of a hallway (COF-006); zero for no
+    /// lanes.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub keep_right_weight: f64,
     /// The lane's middle, from the wall on the right.
@@ -51,7 +55,8 @@ pub struct Params {
     /// Passages wider than this have no lanes.
     #[schemars(range(min = 0.5, max = 10.0))]
     pub hallway_width_max_m: f64,
-    /// Extra cost per metre travelled in contact with the inflated walls, falling to zero at `clearance_m`; zero for none.
+    /// Extra cost per metre travelled in contact with the inflated walls, falling to zero at `clearance_m`;
+    /// zero for none.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub clearance_weight: f64,
     /// Beyond this distance a wall costs nothing.
@@ -84,7 +89,8 @@ pub struct Params {
     /// Obstacles that were not seen for so long are forgotten.
     #[schemars(range(min = 0.5, max = 600.0))]
     pub obstacle_memory_s: f64,
-    /// Without effect, as a grid has no waypoints to draw: it is here so that the table of a sampling planner serves this one too.
+    /// Without effect, as a grid has no waypoints to draw: it is here so that the table of a sampling planner
+    /// serves this one too.
     #[schemars(range(min = 1, max = 10_000))]
     pub samples: u32,
     /// Poses and range readings older than this are not used.
@@ -165,18 +171,29 @@ pub enum ParamsError {
         yaw_rad: f64,
     },
     /// A floor whose grid would be too large.
-    #[error(
-        "floor {floor} needs {cells} cells at resolution_m = {resolution_m}, and {most} are possible: choose larger cells"
-    )]
+    #[error("{what} needs {cells} cells of {resolution_m} m, and {most} are possible: choose larger cells")]
     TooLarge {
-        /// The floor.
-        floor: i32,
+        /// The map, or the floors of the world.
+        what: String,
         /// Cells needed.
-        cells: f64,
+        cells: u64,
         /// The cells' edge.
         resolution_m: f64,
         /// The most.
-        most: f64,
+        most: u64,
+    },
+    /// Cells that are too small for the robot.
+    #[error(
+        "{what} has cells of {resolution_m} m: what robot_radius_m and obstacle_margin_m keep free around an obstacle, {reach_m} m, \
+         is too many of them; choose larger cells"
+    )]
+    TooFine {
+        /// The map, or the floors of the world.
+        what: String,
+        /// The cells' edge.
+        resolution_m: f64,
+        /// How far from an obstacle cells change.
+        reach_m: f64,
     },
 }
 

@@ -5,7 +5,10 @@ mod service;
 
 use crate::grid::DIRECTIONS;
 use crate::queue::BucketQueue;
-use crate::{Algorithm, Costs, DIAGONAL, Field, Grid, Params, Question, Router, STRAIGHT, Search, line};
+use crate::{
+    Algorithm, Costs, DIAGONAL, Field, Grid, GridPlanner, Params, Question, Router, STRAIGHT, Search, lane,
+    line,
+};
 use messages::{PlanStateName, Waypoint};
 use proptest::prelude::*;
 use std::f64::consts::SQRT_2;
@@ -122,6 +125,56 @@ fn obstacles_come_and_go_without_a_trace() {
     assert!(field.is_blocked(cell), "still too near to the other one");
     field.set_obstacle(cell + 1, false);
     assert_eq!(field.moves(), untouched);
+}
+
+#[test]
+fn what_obstacles_cost_goes_with_them() {
+    let costs = Costs { clearance_weight: 4.0, clearance_m: 3.0, keep_right_weight: 1.0, ..PLAIN };
+    let mut field = Field::new(grid_of(&["#.........", "..........", ".........."]), &costs);
+    let (untouched, cell) = (field.extra().to_vec(), field.grid().index(5, 1));
+    field.set_obstacle(cell, true);
+    assert_ne!(field.extra(), untouched);
+    field.set_obstacle(cell + 1, true);
+    field.set_obstacle(cell, false);
+    field.set_obstacle(cell + 1, false);
+    assert_eq!(field.extra(), untouched);
+    // One that was never there takes nothing away.
+    field.set_obstacle(cell, false);
+    assert_eq!(field.extra(), untouched);
+}
+
+#[test]
+fn maps_that_would_need_too_much_are_refused_by_their_heads() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = |head: &str, resolution: f64| {
+        std::fs::write(folder.path().join("m.pgm"), head).unwrap();
+        let yaml = folder.path().join("m.yaml");
+        let text = format!(
+            "image: m.pgm\nresolution: {resolution}\norigin: [0, 0, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
+        );
+        std::fs::write(&yaml, text).unwrap();
+        GridPlanner::check(&Params { map: yaml.to_string_lossy().into_owned(), ..Params::default() })
+    };
+    map("P5 5800 5800 255\n", 0.05).unwrap();
+    let refused = |head: &str, resolution: f64, words: &str| {
+        let error = map(head, resolution).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    refused("P5 5900 5900 255\n", 0.05, "needs 34810000 cells of 0.05 m, and 34000000 are possible");
+    refused("P5 100 100 255\n", 0.001, "m.yaml has cells of 0.001 m: what robot_radius_m");
+    refused("P5 9000 9000 255\n", 0.05, "a grid of 9000 x 9000 cells");
+    refused("P5", 0.05, "it is no image that can be read");
+    let world = "name = \"w\"\n[[floor]]\nnumber = 1\nwalls = [[[0, 0], [90, 90]]]\n[[floor]]\nnumber = 2\nwalls = [[[0, 0], [9, 9]]]\n";
+    let file = folder.path().join("w.toml");
+    std::fs::write(&file, world).unwrap();
+    let params = |resolution_m| Params {
+        world: file.to_string_lossy().into_owned(),
+        resolution_m,
+        ..Params::default()
+    };
+    GridPlanner::check(&params(0.05)).unwrap();
+    let error = GridPlanner::check(&params(0.01)).unwrap_err().to_string();
+    assert!(error.contains("w.toml needs 83810000 cells of 0.01 m"), "{error}");
 }
 
 /// A piece of hallway like that of the coffee robot: 20 m long, 1.7 m wide, along x.
@@ -293,6 +346,29 @@ fn cost_of(field: &Field, cells: &[u32]) -> u32 {
 }
 
 proptest! {
+    #[test]
+    fn runs_end_at_what_is_occupied(
+        cells in prop::collection::vec(prop::bool::weighted(0.2), 1..90), width in 1_usize..12,
+    ) {
+        let height = cells.len().div_ceil(width);
+        let mut grid = Grid::new(width, height, 1.0, [0.0, 0.0]);
+        for (at, _) in cells.iter().enumerate().filter(|(_, occupied)| **occupied) {
+            grid.occupy((at % width) as i64, (at / width) as i64);
+        }
+        let mut seen = 0;
+        lane::Runs::new(&grid).rows(&grid, |cell, runs| {
+            seen += 1;
+            let (column, row) = grid.column_row(cell);
+            for ((dx, dy), run) in DIRECTIONS.into_iter().zip(runs) {
+                let ahead = |step: i64| grid.checked_index(column + step * i64::from(dx), row + step * i64::from(dy));
+                let end = (0..).find(|&step| ahead(step).is_none_or(|cell| grid.is_occupied(cell))).unwrap();
+                let expected = if ahead(end).is_none() { lane::FAR } else { end as u16 };
+                assert_eq!(run, expected, "{column} {row} {dx} {dy}");
+            }
+        });
+        prop_assert_eq!(seen, (0..grid.len()).filter(|&cell| !grid.is_occupied(cell)).count());
+    }
+
     #[test]
     fn as_cheap_as_dijkstra((grid, from, to) in random_grid(), keep_right_weight in 0.0..5.0, plain in any::<bool>()) {
         let lanes = Costs { keep_right_weight, lane_m: 1.0, hallway_width_max_m: 4.0, clearance_weight: 1.0, clearance_m: 2.0, ..PLAIN };

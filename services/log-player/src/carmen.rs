@@ -1,96 +1,141 @@
-//! CARMEN logs: `ODOM x y theta tv rv accel time host logger-time` and `FLASER n r1 .. rn x y theta odom_x odom_y odom_theta time host
-//! logger-time`, metres, radians and seconds. The pose of a `FLASER` line is, in a corrected log, where the laser really was; beams
-//! run from -90 degrees counter-clockwise, 1 degree apart (180 or 181 of them) or half a degree (360 or 361).
+//! CARMEN logs (Montemerlo, Roy, Thrun 2003; the lines as its logger writes them), in metres, radians and
+//! seconds. Each line ends with `time host logger-time`; what stands before:
+//!
+//! - `ODOM x y theta tv rv accel`: the odometry;
+//! - `FLASER n r1 .. rn x y theta odom_x odom_y odom_theta` and `RLASER`: a scan ahead or to the rear, the
+//!   laser's pose and the robot's;
+//! - `ROBOTLASER1 type start fov step max accuracy remission n r1 .. rn m s1 .. sm`, then the laser's pose,
+//!   the robot's, and five numbers of the robot; `ROBOTLASER2` to the rear. Older ones have no `remission`,
+//!   or no strengths;
+//! - `RAWLASER1` to `RAWLASER5` likewise without poses, `LASER3` to `LASER5` as the first two without;
+//! - `TRUEPOS x y theta odom_x odom_y odom_theta`: where a simulated robot really was;
+//! - `PARAM name value`: where lasers sit, and what a beam's width is.
+//!
+//! In a corrected log the pose of a scan is where the robot really was. One laser is played, of the lines
+//! that say most of it.
 
-use crate::log::{Entry, Fault, Log, Record, Words, beginning};
-use crate::params::Timing;
+mod clock;
+mod lines;
+mod survey;
+
+use crate::log::{Entry, Fault, Log, MOST_RECORDS, Record, Remark};
+use crate::params::{Params, Timing};
+use clock::Stamps;
 use geometry::Pose2;
-use std::f64::consts::{FRAC_PI_2, PI};
+use lines::{Line, Scan, Version};
+use survey::{LaserLine, Survey};
+
+/// Poses on which a laser keeps its place on the robot agree to this, in metres and radians.
+const MOUNT_TOLERANCE: f64 = 0.02;
+/// No laser sits farther from the middle of a robot that drives in buildings, in metres.
+const MOUNT_MAX_M: f64 = 2.0;
 
 /// Reads the text of a log.
 pub fn read(text: &str, timing: Timing, period_s: f64) -> Log {
+    read_as(text, &Params { timing, period_s, ..Params::default() })
+}
+
+/// A line that is played.
+#[derive(Debug)]
+struct Moment {
+    /// Counted from 1.
+    line: usize,
+    stamps: Stamps,
+    what: Line,
+}
+
+/// Reads the text of a log as the parameters say.
+pub(crate) fn read_as(text: &str, params: &Params) -> Log {
+    let text = text.trim_start_matches('\u{feff}');
     let mut log = Log::default();
-    // Records, each with its own time stamp; the truth of a scan shares the scan's.
+    let survey = Survey::of(text);
+    let laser = survey.choose(params.laser);
+    survey.tell(laser, &mut log);
+    if let (None, Some(number)) = (laser, params.laser.number()) {
+        log.note(0, Fault::NoSuchLaser { number });
+    }
+    let version = laser.and_then(|laser| Version::of(text, laser));
     let mut moments: Vec<Moment> = Vec::new();
     for (index, line) in text.lines().enumerate() {
-        match read_line(line) {
-            Ok(Some(moment)) => moments.push(moment),
+        if moments.len() >= MOST_RECORDS {
+            log.note(index + 1, Fault::TooMany);
+            break;
+        }
+        match lines::read(line, laser, version, &survey, params, &mut log.remarks) {
+            Ok(Some((stamps, what))) => moments.push(Moment { line: index + 1, stamps, what }),
             Ok(None) => {}
             Err(fault) => log.note(index + 1, fault),
         }
     }
-    let recorded = match timing {
-        Timing::Recorded => true,
-        Timing::Order => false,
-        Timing::Auto => are_of_use(moments.iter().map(|(time, _)| *time)),
-    };
-    let first_s = moments.iter().find_map(|(time, _)| *time).unwrap_or_default();
-    let mut at_s = 0.0_f64;
-    for (index, (time, records)) in moments.into_iter().enumerate() {
-        // Time never runs backwards; a line without a usable stamp comes with the line before.
-        at_s = if recorded {
-            time.map_or(at_s, |time| at_s.max(time - first_s))
-        } else {
-            index as f64 * period_s
-        };
-        log.entries.extend(records.into_iter().map(|record| Entry { at_s, record }));
+    if let Some(laser) = laser {
+        settle_poses(&mut moments, laser, &survey, &mut log);
     }
-    log.settle(period_s);
+    let stamps: Vec<_> =
+        moments.iter().map(|moment| (moment.line, moment.what.kind(), moment.stamps)).collect();
+    let times = clock::times(&stamps, params.timing, params.period_s, &mut log);
+    drop(stamps);
+    let has_truth = survey.has_lines("TRUEPOS");
+    log.truth_is_of_scans = !has_truth;
+    log.entries.reserve(moments.len());
+    for (moment, at_s) in moments.into_iter().zip(times) {
+        let mut push = |record| log.entries.push(Entry { at_s, record });
+        match moment.what {
+            Line::Odometry(pose) => push(Record::Odometry(pose)),
+            Line::Truth(pose) => push(Record::Truth(pose)),
+            Line::Scan(scan) => {
+                let Scan { laser, robot, odometry, angle_min_rad, angle_step_rad, range_max_m, ranges_m } =
+                    *scan;
+                // The odometry of a moment comes before what was seen there.
+                odometry.into_iter().for_each(|pose| push(Record::Odometry(pose)));
+                push(Record::Scan { sensor: laser, angle_min_rad, angle_step_rad, range_max_m, ranges_m });
+                robot.filter(|_| !has_truth).into_iter().for_each(|pose| push(Record::Truth(pose)));
+            }
+        }
+    }
+    log.settle(params.period_s);
     log
 }
 
-/// Whether time stamps tell the lines apart: stamps rounded to ten seconds, or to a day, do not.
-fn are_of_use(stamps: impl Iterator<Item = Option<f64>>) -> bool {
-    let (mut lines, mut forward, mut last) = (0_usize, 0_usize, f64::NEG_INFINITY);
-    for stamp in stamps.map(|stamp| stamp.unwrap_or(f64::NEG_INFINITY)) {
-        lines += 1;
-        let step_s = stamp - last;
-        forward += usize::from(step_s > 0.0 && (step_s < 60.0 || last == f64::NEG_INFINITY));
-        last = stamp;
+/// From the poses of laser and robot in the map to the laser's place on the robot, and the robot's in the
+/// map.
+fn settle_poses(moments: &mut [Moment], laser: &LaserLine, survey: &Survey<'_>, log: &mut Log) {
+    let scans = || {
+        moments.iter().filter_map(|moment| match &moment.what {
+            Line::Scan(scan) => Some(scan),
+            Line::Odometry(_) | Line::Truth(_) => None,
+        })
+    };
+    let mounts = || scans().filter_map(|scan| Some(scan.robot?.to(scan.laser)));
+    let first = mounts().next();
+    let is_fixed = |first: Pose2| {
+        first.x_m.hypot(first.y_m) <= MOUNT_MAX_M
+            && mounts().all(|mount| {
+                let change = first.to(mount);
+                [change.x_m, change.y_m, change.heading_rad].iter().all(|part| part.abs() <= MOUNT_TOLERANCE)
+            })
+    };
+    let fixed = first.filter(|first| is_fixed(*first));
+    if first.is_some() && fixed.is_none() {
+        log.remarks.push(Remark::CorrectedPoses);
     }
-    2 * forward > lines
-}
-
-/// What a line recorded, and its time stamp.
-type Moment = (Option<f64>, Vec<Record>);
-
-fn read_line(line: &str) -> Result<Option<Moment>, Fault> {
-    let Some(keyword) = line.split_ascii_whitespace().next() else { return Ok(None) };
-    match keyword {
-        "ODOM" => {
-            let words = Words::new("ODOM", line, 10)?;
-            Ok(Some((Some(words.number(words.words.len() - 1)?), vec![Record::Odometry(words.pose(1)?)])))
+    // Of poses with a rounded difference none is moved.
+    let fixed = fixed.map(|mount| if is_nothing(mount) { Pose2::IDENTITY } else { mount });
+    let mount = fixed.unwrap_or_else(|| survey.mount(laser));
+    let has_odometry = survey.has_lines("ODOM");
+    let from_scans = first.is_some() && !has_odometry;
+    if from_scans {
+        log.remarks.push(Remark::OdometryOfScans { keyword: laser.keyword });
+    }
+    for moment in moments {
+        let Line::Scan(scan) = &mut moment.what else { continue };
+        if let Some(robot) = scan.robot {
+            scan.odometry = from_scans.then_some(robot);
+            scan.robot = Some(if fixed.is_some() { robot } else { scan.laser.compose(mount.inverse()) });
         }
-        "FLASER" => {
-            let words = Words::new("FLASER", line, 3)?;
-            let count = words.beams(1)?;
-            words.need(2 + count + 9)?;
-            let scan = Record::Scan {
-                sensor: Pose2::IDENTITY,
-                angle_min_rad: -FRAC_PI_2,
-                angle_step_rad: beam_step_rad(count),
-                ranges_m: words.ranges(2, count)?,
-            };
-            let truth = Record::Truth(words.pose(2 + count)?);
-            Ok(Some((Some(words.number(words.words.len() - 1)?), vec![scan, truth])))
-        }
-        comment if comment.starts_with('#') => Ok(None),
-        // Parameters, other sensors, and what corrections have left behind.
-        other
-            if other
-                .bytes()
-                .all(|byte| byte.is_ascii_uppercase() || byte.is_ascii_digit() || byte == b'_') =>
-        {
-            Ok(None)
-        }
-        word => Err(Fault::UnknownLine { word: beginning(word) }),
+        scan.laser = mount;
     }
 }
 
-fn beam_step_rad(count: usize) -> f64 {
-    match count {
-        180 | 181 => PI / 180.0,
-        360 | 361 => PI / 360.0,
-        _ => PI / (count.max(2) - 1) as f64,
-    }
+fn is_nothing(mount: Pose2) -> bool {
+    [mount.x_m, mount.y_m, mount.heading_rad].iter().all(|part| part.abs() < 1e-6)
 }

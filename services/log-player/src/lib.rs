@@ -1,10 +1,11 @@
-//! Plays a recorded drive onto the board: odometry, radio ranges, laser scans and, where it is known, the truth.
+//! Plays a recorded drive onto the board: odometry, radio ranges, laser scans and, where it is known, the
+//! truth.
 //!
-//! Everything is published in one frame, that of the true poses; a log is read whole before the first step, and a step says what is
-//! due.
+//! Everything is published in one frame, that of the true poses; a log is read whole before the first step,
+//! and a step says what is due.
 
 mod carmen;
-mod files;
+mod load;
 mod log;
 mod params;
 mod steps;
@@ -13,9 +14,9 @@ mod steps;
 mod tests;
 
 pub use carmen::read as read_carmen;
-pub use files::{LoadError, load};
-pub use log::{Entry, Fault, Log, PROBLEM_LIMIT, Problem, Record};
-pub use params::{AnchorPlace, Format, Params, ParamsError, Pose, Scans, Timing};
+pub use load::{LoadError, check_files, load};
+pub use log::{Entry, Fault, Log, PROBLEM_LIMIT, Problem, Record, Remark, Times};
+pub use params::{AnchorPlace, Format, Laser, Params, ParamsError, Pose, Scans, Timing};
 pub use steps::read as read_steps;
 
 use geometry::Pose2;
@@ -41,13 +42,15 @@ pub enum Due {
 /// The player.
 #[derive(Debug, Clone)]
 pub struct LogPlayer {
-    /// Messages, each with the time since the beginning of the play at which it is due.
-    play: Vec<(Duration, Due)>,
+    /// What is played, in order.
+    entries: Vec<Entry>,
+    writer: Writer,
     due: Vec<Due>,
     next: usize,
     begun: Option<Time>,
     problems: Vec<Problem>,
     problem_count: usize,
+    remarks: Vec<Remark>,
 }
 
 impl LogPlayer {
@@ -57,36 +60,27 @@ impl LogPlayer {
     /// When the parameters make no sense.
     pub fn new(params: &Params, log: Log) -> Result<Self, ParamsError> {
         params.check()?;
-        let Log { mut entries, mut problems, mut problem_count } = log;
-        leave_out(&mut entries, params);
-        let mut unknown: Vec<u32> = Vec::new();
-        let mut writer = Writer::new(params);
+        let Log { mut entries, mut problems, mut problem_count, remarks, truth_is_of_scans } = log;
+        leave_out(&mut entries, params, truth_is_of_scans);
         let last_truth = entries.iter().rposition(|entry| matches!(entry.record, Record::Truth(_)));
-        let mut play = Vec::with_capacity(entries.len());
-        for (index, entry) in entries.into_iter().enumerate() {
-            let at_s = params.start_delay_s + entry.at_s / params.speed;
-            let message = writer.write(entry, last_truth == Some(index), &mut unknown);
-            // A time beyond any clock cannot become a duration; such an entry never comes.
-            if let Ok(at) = Duration::try_from_secs_f64(at_s) {
-                play.push((at, message));
-            }
-        }
-        for id in unknown {
+        let writer = Writer::new(params, last_truth);
+        // A time beyond any clock cannot become a duration; such an entry never comes.
+        entries.truncate(entries.partition_point(|entry| writer.at(entry).is_some()));
+        for id in unknown_anchors(&entries, params) {
             problem_count += 1;
             problems.push(Problem { line: 0, fault: Fault::UnknownAnchor { id } });
         }
-        Ok(Self { due: Vec::new(), play, next: 0, begun: None, problems, problem_count })
+        Ok(Self { entries, writer, due: Vec::new(), next: 0, begun: None, problems, problem_count, remarks })
     }
 
     /// What is due since the last step, in order. The play begins with the first step.
     pub fn step(&mut self, now: Time) -> &[Due] {
         let begun = *self.begun.get_or_insert(now);
         self.due.clear();
-        while let Some((at, message)) = self.play.get_mut(self.next)
-            && begun.after(*at) <= now
+        while let Some(entry) = self.entries.get_mut(self.next)
+            && self.writer.at(entry).is_some_and(|at| begun.after(at) <= now)
         {
-            // Each message is played once; what it holds moves on.
-            self.due.push(std::mem::replace(message, Due::Truth(TruePose::default())));
+            self.due.push(self.writer.write(self.next, entry));
             self.next += 1;
         }
         &self.due
@@ -94,12 +88,12 @@ impl LogPlayer {
 
     /// Whether everything was played.
     pub fn is_finished(&self) -> bool {
-        self.next == self.play.len()
+        self.next == self.entries.len()
     }
 
     /// How long the play takes in all.
     pub fn length(&self) -> Duration {
-        self.play.last().map_or(Duration::ZERO, |(at, _)| *at)
+        self.entries.last().and_then(|entry| self.writer.at(entry)).unwrap_or_default()
     }
 
     /// What of the log could not be played, the first of it.
@@ -111,13 +105,17 @@ impl LogPlayer {
     pub fn problem_count(&self) -> usize {
         self.problem_count
     }
+
+    /// How the log was read, where it leaves a choice.
+    pub fn remarks(&self) -> &[Remark] {
+        &self.remarks
+    }
 }
 
-/// Takes away the scans that are not to be played and, where a log holds the truth of each scan beside it, that. A truth that stands in for
-/// a localiser's pose comes at once with its scan.
-fn leave_out(entries: &mut Vec<Entry>, params: &Params) {
+/// Takes away the scans that are not to be played and, where a log holds the truth of each scan beside it,
+/// that. A truth that stands in for a localiser's pose comes at once with its scan.
+fn leave_out(entries: &mut Vec<Entry>, params: &Params, truth_is_of_scans: bool) {
     let (mut number, mut plays, mut scan_s) = (0, true, 0.0);
-    let has_own_truth = params.format == Format::Carmen;
     entries.retain_mut(|entry| match entry.record {
         Record::Scan { .. } => {
             plays = params.scans.plays(number);
@@ -125,7 +123,7 @@ fn leave_out(entries: &mut Vec<Entry>, params: &Params) {
             scan_s = entry.at_s;
             plays
         }
-        Record::Truth(_) if has_own_truth => {
+        Record::Truth(_) if truth_is_of_scans => {
             if params.truth_as_location {
                 entry.at_s = scan_s;
             }
@@ -133,6 +131,21 @@ fn leave_out(entries: &mut Vec<Entry>, params: &Params) {
         }
         _ => true,
     });
+}
+
+/// The anchors that were heard and have no place, the first of them.
+fn unknown_anchors(entries: &[Entry], params: &Params) -> Vec<u32> {
+    let mut unknown = Vec::new();
+    for entry in entries {
+        let Record::Ranges { heard, .. } = &entry.record else { continue };
+        for &(id, _) in heard {
+            let is_known = unknown.contains(&id) || params.anchors.iter().any(|anchor| anchor.id == id);
+            if !is_known && unknown.len() < PROBLEM_LIMIT {
+                unknown.push(id);
+            }
+        }
+    }
+    unknown
 }
 
 /// Where a localiser that knows the truth says that the robot is.
@@ -148,40 +161,50 @@ pub fn located(truth: &TruePose) -> PoseEstimate {
     }
 }
 
-/// Turns records into messages.
-struct Writer<'a> {
-    params: &'a Params,
+/// Turns records into messages, one after the other.
+#[derive(Debug, Clone)]
+struct Writer {
+    params: Params,
+    /// Which entry is the last true pose.
+    last_truth: Option<usize>,
     last: Option<(f64, Pose2)>,
     left_travel_m: f64,
     right_travel_m: f64,
 }
 
-impl<'a> Writer<'a> {
-    fn new(params: &'a Params) -> Self {
-        Self { params, last: None, left_travel_m: 0.0, right_travel_m: 0.0 }
+impl Writer {
+    fn new(params: &Params, last_truth: Option<usize>) -> Self {
+        Self { params: params.clone(), last_truth, last: None, left_travel_m: 0.0, right_travel_m: 0.0 }
     }
 
-    fn write(&mut self, entry: Entry, is_last: bool, unknown: &mut Vec<u32>) -> Due {
-        match entry.record {
-            Record::Odometry(pose) => Due::Odometry(self.odometry(entry.at_s, pose)),
-            Record::Ranges { antenna_m, heard } => Due::Tag(Box::new(self.tag(antenna_m, &heard, unknown))),
-            Record::Scan { sensor, angle_min_rad, angle_step_rad, ranges_m } => {
+    /// The time since the beginning of the play at which an entry is due.
+    fn at(&self, entry: &Entry) -> Option<Duration> {
+        Duration::try_from_secs_f64(self.params.start_delay_s + entry.at_s / self.params.speed).ok()
+    }
+
+    /// The message of an entry, which is played once: what it holds moves on.
+    fn write(&mut self, index: usize, entry: &mut Entry) -> Due {
+        let at_s = entry.at_s;
+        match &mut entry.record {
+            Record::Odometry(pose) => Due::Odometry(self.odometry(at_s, *pose)),
+            Record::Ranges { antenna_m, heard } => Due::Tag(Box::new(self.tag(*antenna_m, heard))),
+            Record::Scan { sensor, angle_min_rad, angle_step_rad, range_max_m, ranges_m } => {
                 let header = RangeScan {
                     sensor_x_m: sensor.x_m,
                     sensor_y_m: sensor.y_m,
                     sensor_heading_rad: sensor.heading_rad,
-                    angle_min_rad,
-                    angle_step_rad,
-                    range_max_m: self.params.range_max_m,
+                    angle_min_rad: *angle_min_rad,
+                    angle_step_rad: *angle_step_rad,
+                    range_max_m: range_max_m.unwrap_or(self.params.range_max_m),
                 };
-                Due::Scan(header, ranges_m)
+                Due::Scan(header, std::mem::take(ranges_m))
             }
             Record::Truth(pose) => Due::Truth(TruePose {
                 x_m: pose.x_m,
                 y_m: pose.y_m,
                 heading_rad: pose.heading_rad,
                 floor: 0,
-                is_last: u32::from(is_last),
+                is_last: u32::from(self.last_truth == Some(index)),
             }),
         }
     }
@@ -207,7 +230,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    fn tag(&self, antenna_m: [f64; 3], heard: &[(u32, f64)], unknown: &mut Vec<u32>) -> TagRanges {
+    fn tag(&self, antenna_m: [f64; 3], heard: &[(u32, f64)]) -> TagRanges {
         let mut tag = TagRanges {
             antenna_x_m: antenna_m[0],
             antenna_y_m: antenna_m[1],
@@ -215,12 +238,7 @@ impl<'a> Writer<'a> {
             ..TagRanges::default()
         };
         for &(id, range_m) in heard {
-            let Some([x_m, y_m, z_m]) = self.params.anchor_in_map(id) else {
-                if !unknown.contains(&id) && unknown.len() < PROBLEM_LIMIT {
-                    unknown.push(id);
-                }
-                continue;
-            };
+            let Some([x_m, y_m, z_m]) = self.params.anchor_in_map(id) else { continue };
             let index = tag.anchor_count as usize;
             if index < ANCHOR_CAPACITY {
                 tag.anchors[index] = AnchorRange { x_m, y_m, z_m, range_m, id, quality_percent: 100.0 };

@@ -1,5 +1,5 @@
 //! The process around `log_player`.
-use log_player::{Due, LogPlayer, Params, load, located};
+use log_player::{Due, LogPlayer, Params, check_files, load, located};
 use messages::{Odometry, PoseEstimate, RangeScan, TagRanges, TruePose};
 use std::process::ExitCode;
 
@@ -14,9 +14,21 @@ fn main() -> ExitCode {
             false => None,
         };
         node.every(params.tick());
+        check_files(&params)?;
+        node.declared()?;
         let mut player = LogPlayer::new(&params, load(&params)?)?;
+        for remark in player.remarks() {
+            match remark.is_doubtful() {
+                true => tracing::warn!(file = params.file, "{remark}"),
+                false => tracing::info!(file = params.file, "{remark}"),
+            }
+        }
         for problem in player.problems() {
             tracing::warn!(file = params.file, "{problem}");
+        }
+        let untold = player.problem_count().saturating_sub(player.problems().len());
+        if untold > 0 {
+            tracing::warn!(file = params.file, "and {untold} more of the kind");
         }
         Ok(move |now| {
             for due in player.step(now) {

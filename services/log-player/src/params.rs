@@ -9,10 +9,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
-    /// Lines `ODOM step dx dy dphi`, `LASER step ..`, `BEACON step id range ..`: MRPT's action-observation pairs as text.
+    /// Lines `ODOM step dx dy dphi`, `LASER step ..`, `BEACON step id range ..`: MRPT's action-observation
+    /// pairs as text.
     #[default]
     Steps,
-    /// CARMEN's `ODOM x y theta ..` and `FLASER n r1 .. rn x y theta ..`.
+    /// CARMEN's `ODOM x y theta ..`, `FLASER n r1 .. rn x y theta ..`, `ROBOTLASER1 ..`, `RAWLASER1 ..` and
+    /// the like.
     Carmen,
 }
 
@@ -27,6 +29,39 @@ pub enum Timing {
     Recorded,
     /// From the order in the log: `period_s` from one to the next.
     Order,
+}
+
+/// Which laser of a CARMEN log is played, by its place on the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Laser {
+    /// The first of those below of which the log holds scans.
+    #[default]
+    Auto,
+    /// The one that looks ahead: `FLASER`, `ROBOTLASER1`, `RAWLASER1`.
+    Front,
+    /// The one that looks to the rear: `RLASER`, `ROBOTLASER2`, `RAWLASER2`.
+    Rear,
+    /// `LASER3`, `RAWLASER3`.
+    Third,
+    /// `LASER4`, `RAWLASER4`.
+    Fourth,
+    /// `LASER5`, `RAWLASER5`.
+    Fifth,
+}
+
+impl Laser {
+    /// Its number in today's CARMEN logs; `None` for whichever there is.
+    pub fn number(self) -> Option<u32> {
+        Some(match self {
+            Self::Auto => return None,
+            Self::Front => 1,
+            Self::Rear => 2,
+            Self::Third => 3,
+            Self::Fourth => 4,
+            Self::Fifth => 5,
+        })
+    }
 }
 
 /// Which scans of a log are played.
@@ -58,14 +93,22 @@ impl Scans {
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// The log, as text or compressed by gzip; empty plays nothing.
+    #[schemars(extend("format" = "path"))]
     pub file: String,
     /// How the log is written.
     pub format: Format,
     /// True poses beside the log, lines `row x y heading`; empty for none, or when the log holds them itself.
+    #[schemars(extend("format" = "path"))]
     pub truth: String,
     /// Row k of the true poses belongs to step k plus this.
     #[schemars(range(min = 0, max = 1000))]
     pub truth_step_offset: u32,
+    /// Which laser of a CARMEN log is played.
+    pub laser: Laser,
+    /// Field of view of a laser whose lines do not hold it (`FLASER`, `RLASER`, `LASER3`); 0 for what the
+    /// log's PARAM lines say, or else what instruments with so many beams have.
+    #[schemars(range(min = 0.0, max = 6.3))]
+    pub laser_fov_rad: f64,
     /// Which scans are played; in a CARMEN log the true pose of a scan goes with it.
     pub scans: Scans,
     /// Publishes the true poses as `location/pose` too, in the place of a localiser: to make a map.
@@ -84,7 +127,7 @@ pub struct Params {
     /// How often it is looked what is due.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub tick_ms: f64,
-    /// Laser ranges from here on mean "nothing seen".
+    /// Laser ranges from here on mean "nothing seen", where the log does not say it.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub range_max_m: f64,
     /// Distance between the wheels, from which their paths are made up.
@@ -129,6 +172,8 @@ impl Default for Params {
             format: Format::Steps,
             truth: String::new(),
             truth_step_offset: 1,
+            laser: Laser::Auto,
+            laser_fov_rad: 0.0,
             scans: Scans::All,
             truth_as_location: false,
             speed: 1.0,
@@ -206,6 +251,7 @@ impl Parameters for Params {
             ("period_s", self.period_s, 0.001, 3600.0),
             ("start_delay_s", self.start_delay_s, 0.0, 60.0),
             ("tick_ms", self.tick_ms, 0.1, 1000.0),
+            ("laser_fov_rad", self.laser_fov_rad, 0.0, 6.3),
             ("range_max_m", self.range_max_m, 0.1, 1000.0),
             ("wheel_track_m", self.wheel_track_m, 0.01, 10.0),
             ("map_in_anchor_frame.x_m", frame.x_m, -1e6, 1e6),

@@ -1,27 +1,43 @@
 //! Logs in steps: MRPT's pairs of an action and its observations, written as text.
 //!
-//! `ODOM step dx dy dphi`: the motion since the step before, in the robot's frame. `LASER step aperture x y phi n r_0 .. r_n-1`: the
-//! sensor in the robot's frame, beams from minus to plus half the aperture. `BEACON step id range x y z`: the antenna in the robot's
-//! frame, its height above the floor. Metres and radians; `#` begins a comment.
+//! `ODOM step dx dy dphi`: the motion since the step before, in the robot's frame. `LASER step aperture x y
+//! phi n r_0 .. r_n-1`: the sensor in the robot's frame, beams from minus to plus half the aperture. `BEACON
+//! step id range x y z`: the antenna in the robot's frame, its height above the floor. Metres and radians;
+//! `#` begins a comment. A beam may be infinite, where nothing was seen, or NaN, where nothing was read.
 
-use crate::log::{Entry, Fault, Log, Record, Words, beginning};
+use crate::log::{Entry, Fault, Log, MOST_RECORDS, Record, Words, beginning};
 use geometry::Pose2;
 
 /// Reads the text of a log and, beside it, of the true poses.
 pub fn read(text: &str, truth: &str, truth_step_offset: u32, period_s: f64) -> Log {
     let mut reader = Reader { log: Log::default(), pose: Pose2::IDENTITY, step: 0.0, period_s };
-    for (index, line) in text.lines().enumerate() {
+    for (index, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+        if reader.log.entries.len() >= MOST_RECORDS {
+            reader.log.note(index + 1, Fault::TooMany);
+            break;
+        }
         if let Err(fault) = reader.line(line) {
             reader.log.note(index + 1, fault);
         }
     }
-    for (index, line) in truth.lines().enumerate() {
+    for (index, line) in truth.trim_start_matches('\u{feff}').lines().enumerate() {
+        if reader.log.entries.len() >= 2 * MOST_RECORDS {
+            reader.log.note(index + 1, Fault::TooMany);
+            break;
+        }
         if let Err(fault) = reader.truth(line, f64::from(truth_step_offset)) {
             reader.log.note(index + 1, fault);
         }
     }
     reader.log.settle(period_s);
     reader.log
+}
+
+/// The line up to a word that begins with `#`; within a word it means nothing, as in `1.#INF`.
+fn without_comment(line: &str) -> &str {
+    let begins = |at: usize| line[..at].chars().next_back().is_none_or(char::is_whitespace);
+    let comment = line.match_indices('#').map(|(at, _)| at).find(|&at| begins(at));
+    &line[..comment.unwrap_or(line.len())]
 }
 
 struct Reader {
@@ -33,12 +49,12 @@ struct Reader {
 
 impl Reader {
     fn line(&mut self, line: &str) -> Result<(), Fault> {
+        let line = without_comment(line);
         match line.split_ascii_whitespace().next() {
             None => Ok(()),
-            Some(word) if word.starts_with('#') => Ok(()),
-            Some("ODOM") => self.odometry(&Words::new("ODOM", line, 5)?),
-            Some("LASER") => self.scan(&Words::new("LASER", line, 8)?),
-            Some("BEACON") => self.range(&Words::new("BEACON", line, 7)?),
+            Some("ODOM") => self.odometry(&Words::exactly("ODOM", line, 5)?),
+            Some("LASER") => self.scan(&Words::new("LASER", line)),
+            Some("BEACON") => self.range(&Words::exactly("BEACON", line, 7)?),
             Some(word) => Err(Fault::UnknownLine { word: beginning(word) }),
         }
     }
@@ -70,10 +86,17 @@ impl Reader {
         let (aperture_rad, sensor, count) = (words.number(2)?, words.pose(3)?, words.beams(6)?);
         words.need(7 + count)?;
         let ranges_m = words.ranges(7, count)?;
+        let range_max_m = None;
         let angle_step_rad = aperture_rad / (count.max(2) - 1) as f64;
         self.push(
             step,
-            Record::Scan { sensor, angle_min_rad: -0.5 * aperture_rad, angle_step_rad, ranges_m },
+            Record::Scan {
+                sensor,
+                angle_min_rad: -0.5 * aperture_rad,
+                angle_step_rad,
+                range_max_m,
+                ranges_m,
+            },
         );
         Ok(())
     }
@@ -102,7 +125,7 @@ impl Reader {
         if line.trim().is_empty() || line.starts_with(['#', '%']) {
             return Ok(());
         }
-        let words = Words::new("truth", line, 4)?;
+        let words = Words::new("truth", line);
         let (row, pose) = (words.number(0)?, words.pose(1)?);
         let at_s = (row + offset) * self.period_s;
         // The log may have been cut off; its truth ends with it.

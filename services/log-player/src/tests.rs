@@ -1,3 +1,5 @@
+mod carmen;
+
 use crate::*;
 use std::f64::consts::FRAC_PI_2;
 use std::io::Write;
@@ -26,7 +28,7 @@ fn steps(text: &str) -> Log {
     read_steps(text, "0 0 0 0\n1 0.25 0 1.5\n9 0 0 0\n", 1, 1.0)
 }
 
-fn carmen(text: &str) -> Log {
+fn carmen_log(text: &str) -> Log {
     read_carmen(text, Timing::Auto, 0.1)
 }
 
@@ -80,7 +82,7 @@ fn the_truth_comes_after_the_moment_and_before_the_next() {
 
 #[test]
 fn a_carmen_log_is_read() {
-    let log = carmen(CARMEN);
+    let log = carmen_log(CARMEN);
     assert_eq!(log.problems, []);
     let times: Vec<f64> = log.entries.iter().map(|one| one.at_s).collect();
     assert_eq!(times, [0.0, 0.5, 0.75, 1.0]);
@@ -90,7 +92,7 @@ fn a_carmen_log_is_read() {
 #[test]
 fn useless_stamps_give_way_to_the_order() {
     let text = "ODOM 0 0 0 0 0 0 1.13486e+09 h 1.13486e+09\n".repeat(5);
-    let times: Vec<f64> = carmen(&text).entries.iter().map(|one| one.at_s).collect();
+    let times: Vec<f64> = carmen_log(&text).entries.iter().map(|one| one.at_s).collect();
     assert!(
         times.iter().zip([0.0, 0.1, 0.2, 0.3, 0.4]).all(|(time, wanted)| (time - wanted).abs() < 1e-9),
         "{times:?}"
@@ -110,6 +112,11 @@ fn check_fault(log: Log, whole: usize, line: usize, told: &str) {
 fn garbled_lines_are_named_and_left_out() {
     let with = |line: &str| read_steps(&STEPS.replace("BEACON 1 1 4.5 0.16 0 1.12", line), "", 1, 1.0);
     check_fault(with("BEACON 1 1 4."), 5, 7, "BEACON needs 7 words, and there are 4");
+    check_fault(with("BEACON 1 1 4.5 0.16 0 1.12 7"), 5, 7, "BEACON needs 7 words, and there are 8");
+    check_fault(with("BEACON 1 1 inf 0.16 0 1.12"), 5, 7, "`inf` is not a number");
+    check_fault(with("ODOM 1 0 0 0 0"), 5, 7, "ODOM needs 5 words, and there are 6");
+    check_fault(with("LASER 1 3.14 0 0 0 2 1.0 2.0 3.0"), 5, 7, "LASER needs 9 words, and there are 10");
+    check_fault(with("LASER 1 3.14 0 0 0 2 1.0 x"), 5, 7, "`x` is not a number");
     check_fault(with("BEACON 1 1 4.5 0.16 0 abc"), 5, 7, "`abc` is not a number");
     check_fault(with("BEACON 1 1 NaN 0.16 0 1.12"), 5, 7, "`NaN` is not a number");
     check_fault(with("BEACON 1 -1 4.5 0.16 0 1.12"), 5, 7, "`-1` is not a number");
@@ -117,11 +124,40 @@ fn garbled_lines_are_named_and_left_out() {
     check_fault(with("\u{fffd}\u{1}xx"), 5, 7, "begins no line of this format");
     check_fault(with("LASER 1 3.14 0 0 0 4 1.0 2.0"), 5, 7, "LASER needs 11 words, and there are 9");
     check_fault(with("LASER 1 3.14 0 0 0 1e9 1.0"), 5, 7, "1000000000 beams");
-    let carmen_with = |line: &str| carmen(&CARMEN.replace("ODOM 1.5 2 0.5 0.1 0.2 0 11.0 host 11.0", line));
+    let carmen_with =
+        |line: &str| carmen_log(&CARMEN.replace("ODOM 1.5 2 0.5 0.1 0.2 0 11.0 host 11.0", line));
     check_fault(carmen_with("ODOM 1.5 2"), 3, 6, "ODOM needs 10 words");
+    check_fault(
+        carmen_with("ODOM 1.5 2 0.5 0.1 0.2 0 11.0 my host 11.0"),
+        3,
+        6,
+        "ODOM needs 10 words, and there are 11",
+    );
     check_fault(carmen_with("FLASER 180 1.0 2.0"), 3, 6, "FLASER needs 191 words");
     check_fault(carmen_with("FLASER x 1.0 2.0"), 3, 6, "`x` is not a number");
     check_fault(carmen_with("?"), 3, 6, "`?` begins no line");
+}
+
+#[test]
+fn a_beam_without_an_echo_keeps_its_scan() {
+    let log = steps(&STEPS.replace("3 1.0 2.0 81.0", "9 1.0 inf nan -inf 0 -2 1e9 1.#INF -1.#IND0  # beams"));
+    assert_eq!(log.problems, []);
+    let Record::Scan { ranges_m, .. } = &log.entries[1].record else { panic!("{log:?}") };
+    let told: Vec<String> = ranges_m.iter().map(|range_m| range_m.to_string()).collect();
+    assert_eq!(told, ["1", "inf", "NaN", "-inf", "0", "-2", "1000000000", "inf", "NaN"]);
+}
+
+#[test]
+fn a_mark_before_the_first_line_is_no_word() {
+    let log = read_steps(&format!("\u{feff}{STEPS}"), "\u{feff}0 0 0 0\n", 1, 1.0);
+    assert_eq!((log.problems.len(), log.entries.len()), (0, 7));
+    let log = carmen_log(&format!(
+        "\u{feff}{}",
+        CARMEN.trim_start_matches(
+            "# message formats defined: PARAM SYNC ODOM FLASER\nPARAM robot_length 0.5 nohost 0\n"
+        )
+    ));
+    assert_eq!((log.problems.len(), log.entries.len()), (0, 4));
 }
 
 #[test]
@@ -217,11 +253,35 @@ fn a_compressed_file_that_ends_early_is_played_up_to_there() {
 }
 
 #[test]
+fn a_log_that_unpacks_without_end_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("log.txt.gz");
+    let mut packer =
+        flate2::write::GzEncoder::new(std::fs::File::create(&file).unwrap(), flate2::Compression::best());
+    let block = vec![b'\n'; 1 << 20];
+    (0..129).for_each(|_| packer.write_all(&block).unwrap());
+    packer.finish().unwrap();
+    let error = load(&Params { file: file.to_string_lossy().into_owned(), ..Params::default() }).unwrap_err();
+    assert!(error.to_string().contains("more than 128 MiB of unpacked content"), "{error}");
+}
+
+#[test]
 fn files_that_hold_nothing_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("empty.txt");
     let params = Params { file: file.to_string_lossy().into_owned(), ..Params::default() };
-    assert!(load(&params).unwrap_err().to_string().contains("cannot read"));
+    for error in [load(&params).unwrap_err(), check_files(&params).unwrap_err()] {
+        assert!(error.to_string().contains("empty.txt: No such file"), "{error}");
+    }
+    for (file, told) in [("/dev/zero", "this is a device"), ("/", "this is a folder")] {
+        for params in [
+            Params { file: file.to_owned(), ..Params::default() },
+            Params { file: "/etc/hostname".to_owned(), truth: file.to_owned(), ..Params::default() },
+        ] {
+            let error = check_files(&params).unwrap_err().to_string();
+            assert!(error.starts_with("cannot read ") && error.contains(told), "{error}");
+        }
+    }
     std::fs::write(&file, "hello\n").unwrap();
     let error = load(&params).unwrap_err().to_string();
     assert!(
@@ -273,7 +333,7 @@ proptest::proptest! {
     #[test]
     fn any_text_is_survived(text in "(\\PC{0,30}\n){0,8}") {
         let _ = steps(&text);
-        let _ = carmen(&text);
+        let _ = carmen_log(&text);
     }
 
     #[test]
@@ -286,7 +346,7 @@ proptest::proptest! {
             format!("{} {}\n", ["ODOM", "LASER 0", "BEACON 0", "FLASER 2", "ODOM 0"][*keyword], words.join(" "))
         }).collect();
         let row = format!("0 {} {} {}\n", truth[1], truth[2], truth[3]);
-        for log in [read_steps(&text, &row, 1, 1.0), carmen(&text)] {
+        for log in [read_steps(&text, &row, 1, 1.0), carmen_log(&text)] {
             proptest::prop_assert!(log.entries.windows(2).all(|pair| pair[0].at_s <= pair[1].at_s));
             let mut player = LogPlayer::new(&anchors(), log).unwrap();
             player.step(Time::ZERO);
@@ -309,8 +369,13 @@ proptest::proptest! {
         let mut bytes = packed(&STEPS.repeat(20));
         let place = place.min(bytes.len() - 1);
         bytes[place] = value;
-        let (text, _) = files::unpack(bytes);
-        let _ = steps(&String::from_utf8_lossy(&text));
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("log.txt.gz");
+        std::fs::write(&file, bytes).unwrap();
+        let params = Params { file: file.to_string_lossy().into_owned(), ..Params::default() };
+        if let Err(error) = load(&params) {
+            proptest::prop_assert!(error.to_string().contains("holds nothing that can be played"), "{}", error);
+        }
     }
 }
 

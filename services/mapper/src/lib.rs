@@ -9,8 +9,8 @@ mod spans;
 #[cfg(test)]
 mod tests;
 
-pub use map::Map;
-pub use params::{Params, ParamsError};
+pub use map::{Beyond, Map};
+pub use params::{Params, ParamsError, SAVED_AS};
 
 use geometry::OccupancyGrid;
 use messages::{OccupancyMap, Parameters, PoseEstimate, RangeScan, Stamped, Time};

@@ -12,11 +12,23 @@ const PER_UNIT: f64 = 1000.0;
 /// Cells that are passed are changed in blocks of as many.
 const LANES: usize = 16;
 
+/// Readings that ended where the map does not reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beyond {
+    /// How many there were.
+    pub readings: u64,
+    /// The least x and y at which one ended, in the map's frame.
+    pub least: Point2<f64>,
+    /// The greatest.
+    pub most: Point2<f64>,
+}
+
 /// A grid of log-odds.
 #[derive(Debug, Clone)]
 pub struct Map {
     frame: GridFrame,
-    /// Thousandths; 0 where nothing is known, or as much speaks for as against. Behind the last row lies one block more.
+    /// Thousandths; 0 where nothing is known, or as much speaks for as against. Behind the last row lies one
+    /// block more.
     cells: Vec<i16>,
     hit: i16,
     clamp: i16,
@@ -27,6 +39,7 @@ pub struct Map {
     spans: Spans,
     /// Cells in which a beam of the present scan ends, and what they held before it.
     ended: Vec<(usize, i16)>,
+    beyond: Option<Beyond>,
     /// Per cent for every value from -`clamp` on.
     percents: Vec<u8>,
 }
@@ -56,6 +69,7 @@ impl Map {
             sectors: Sectors::default(),
             spans: Spans::default(),
             ended: Vec::new(),
+            beyond: None,
             percents: (-clamp..=clamp).map(percent).collect(),
         }
     }
@@ -72,8 +86,9 @@ impl Map {
         map
     }
 
-    /// Takes in a scan that was taken at a pose of the robot: each cell is changed at most once, cells in which a beam ends towards
-    /// occupied, others that a beam passes towards free. `false` when the scan cannot be used.
+    /// Takes in a scan that was taken at a pose of the robot: each cell is changed at most once, cells in
+    /// which a beam ends towards occupied, others that a beam passes towards free. `false` when the scan
+    /// cannot be used.
     pub fn add(&mut self, robot: Pose2, scan: &RangeScan, ranges: &[f32]) -> bool {
         if self.sectors.read(&self.frame, &self.limits, robot, scan, ranges).is_none() {
             return false;
@@ -82,11 +97,20 @@ impl Map {
         let columns = width as usize;
         let cells = &mut self.cells[..];
         self.ended.clear();
-        self.ended.extend(self.sectors.hits.iter().filter_map(|&[x, y]| {
-            let inside = x >= 0.0 && y >= 0.0 && x < f64::from(width) && y < f64::from(height);
-            let index = y as u32 as usize * columns + x as u32 as usize;
-            inside.then(|| (index, cells[index]))
-        }));
+        for &[x, y] in &self.sectors.hits {
+            if x >= 0.0 && y >= 0.0 && x < f64::from(width) && y < f64::from(height) {
+                let index = y as u32 as usize * columns + x as u32 as usize;
+                self.ended.push((index, cells[index]));
+            } else {
+                let place = self.frame.from_cells(Point2::new(x, y));
+                let known = self.beyond.unwrap_or(Beyond { readings: 0, least: place, most: place });
+                self.beyond = Some(Beyond {
+                    readings: known.readings + 1,
+                    least: known.least.inf(&place),
+                    most: known.most.sup(&place),
+                });
+            }
+        }
         self.spans.visit(&self.sectors.free, [width, height], |row, first, end| {
             pass(&mut cells[row * columns..], [first, end], &self.misses, -self.clamp);
         });
@@ -95,6 +119,11 @@ impl Map {
             cells[index] = (before + self.hit).min(self.clamp);
         }
         true
+    }
+
+    /// What was seen where the map does not reach, and is lost.
+    pub fn beyond(&self) -> Option<Beyond> {
+        self.beyond
     }
 
     /// Where the cells lie.
@@ -128,7 +157,8 @@ impl Map {
         })
     }
 
-    /// The same with every cell occupied, free or unknown, as trinary map files have it: occupied above 0.65, free below 0.196.
+    /// The same with every cell occupied, free or unknown, as trinary map files have it: occupied above 0.65,
+    /// free below 0.196.
     pub fn to_trinary_grid(&self) -> OccupancyGrid {
         self.known(|value| match probability(f64::from(value) / PER_UNIT) {
             occupied if occupied > 0.65 => Occupancy::OCCUPIED,
@@ -146,7 +176,8 @@ impl Map {
     }
 }
 
-/// Changes the cells of a row that beams passed, block by block. The last block may reach beyond them, where it changes nothing.
+/// Changes the cells of a row that beams passed, block by block. The last block may reach beyond them, where
+/// it changes nothing.
 fn pass(row: &mut [i16], [first, end]: [usize; 2], misses: &[i16; 2 * LANES], least: i16) {
     let mut at = first;
     while at < end {

@@ -1,19 +1,26 @@
 //! The parameters of the mapper.
 
-use geometry::{GridError, GridFrame, MapError, Pose2};
+use geometry::{GridError, GridFrame, MapError, MapImage, OccupancyGrid, Pose2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
+
+/// The kind of image that a map is saved as.
+pub const SAVED_AS: MapImage = MapImage::Pgm;
 
 /// What can be adjusted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
-    /// ROS map file (YAML) to begin with; empty begins with nothing known. Its size and place replace those below.
+    /// ROS map file (YAML) to begin with; empty begins with nothing known. Its size and place replace those
+    /// below.
+    #[schemars(extend("format" = "path"))]
     pub load: String,
-    /// ROS map file (YAML) that is written, with an image beside it, at the end; empty for none.
+    /// ROS map file (YAML) that is written, with an image beside it, at the end; empty for none. The run
+    /// fails when it cannot be, or takes longer than `stop_after_ms` of the graph.
+    #[schemars(extend("format" = "path"))]
     pub save: String,
-    /// The map is also written this often; 0 for at the end only.
+    /// The map is also written this often while it changes, so that less is lost; 0 for at the end only.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub save_period_s: f64,
     /// Side of a cell.
@@ -31,7 +38,8 @@ pub struct Params {
     /// Extent along y.
     #[schemars(range(min = 0.1, max = 2000.0))]
     pub height_m: f64,
-    /// The floor that is mapped; poses on other floors are left out. Nothing for whatever floor the robot is on.
+    /// The floor that is mapped; poses on other floors are left out. Nothing for whatever floor the robot is
+    /// on.
     pub floor: Option<i32>,
     /// What a reading says of the cell in which it ends: the probability that it is occupied (X-4B).
     #[schemars(range(min = 0.51, max = 0.99))]
@@ -45,8 +53,8 @@ pub struct Params {
     /// Readings are used up to here; one that sees something farther away only clears as far.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub range_max_m: f64,
-    /// A beam that sees nothing within its sensor's range clears as far, at most up to `range_max_m`; 0 when it may have been swallowed by
-    /// glass or black paint, and tells nothing.
+    /// A beam that sees nothing within its sensor's range clears as far, at most up to `range_max_m`; 0 when
+    /// it may have been swallowed by glass or black paint, and tells nothing.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub clear_max_m: f64,
     /// A beam speaks for what lies within its width, and no farther than halfway to the next beam.
@@ -68,7 +76,7 @@ impl Default for Params {
         Self {
             load: String::new(),
             save: String::new(),
-            save_period_s: 0.0,
+            save_period_s: 30.0,
             resolution_m: 0.05,
             min_x_m: -15.0,
             min_y_m: -15.0,
@@ -120,6 +128,9 @@ pub enum ParamsError {
     /// The map to begin with cannot be used.
     #[error("load: {0}")]
     Load(#[from] MapError),
+    /// The map could not be saved where it is to be.
+    #[error("save: {0}")]
+    Save(MapError),
 }
 
 impl messages::Parameters for Params {
@@ -153,6 +164,21 @@ impl messages::Parameters for Params {
 }
 
 impl Params {
+    /// Whether the files that are named can be used: the map to begin with by its head, and the place where
+    /// the map is to be saved. Reads no map, and writes nothing.
+    ///
+    /// # Errors
+    /// When one of them could not be.
+    pub fn check_files(&self) -> Result<(), ParamsError> {
+        if !self.load.is_empty() {
+            OccupancyGrid::look(&self.load)?;
+        }
+        if !self.save.is_empty() {
+            OccupancyGrid::check_save(&self.save, SAVED_AS).map_err(ParamsError::Save)?;
+        }
+        Ok(())
+    }
+
     /// Time between two looks at what is due when nothing arrives.
     pub fn period(&self) -> Duration {
         Duration::from_millis(self.period_ms)

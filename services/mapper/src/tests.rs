@@ -71,6 +71,41 @@ fn a_square_room_is_free_inside_and_occupied_at_its_walls() {
 }
 
 #[test]
+fn what_is_seen_beyond_the_map_is_counted() {
+    let mut map = empty(&params());
+    let (robot, scan) = (Pose2::new(4.0, 0.0, 0.0), turning());
+    let look_at = |half_m: f64| look(&room(half_m), robot, &scan, 360);
+    assert!(map.add(robot, &scan, &look_at(4.9)));
+    assert_eq!(map.beyond(), None);
+    assert!(map.add(robot, &scan, &look_at(6.0)));
+    let beyond = map.beyond().unwrap();
+    assert!(beyond.readings > 100, "{beyond:?}");
+    assert!((beyond.most.x - 6.0).abs() < 0.1 && (beyond.most.y - 6.0).abs() < 0.1, "{beyond:?}");
+    assert!((beyond.least.y + 6.0).abs() < 0.1, "{beyond:?}");
+}
+
+#[test]
+fn where_a_map_cannot_be_saved_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let params = |save: &str| {
+        let save = folder.path().join(save).to_string_lossy().into_owned();
+        Params { save, ..params() }
+    };
+    let refused = |save: &str, words: &str| {
+        let error = params(save).check_files().unwrap_err().to_string();
+        assert!(error.starts_with("save: ") && error.contains(words), "{error}");
+    };
+    params("house.yaml").check_files().unwrap();
+    refused("house.pgm", "under the name of its YAML, such as ");
+    refused("gone/house.yaml", "gone does not exist");
+    std::fs::create_dir(folder.path().join("house")).unwrap();
+    refused("house", "this is a folder");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "the check has written something");
+    let load = Params { load: "/dev/zero".to_owned(), ..Params::default() };
+    assert!(load.check_files().unwrap_err().to_string().contains("/dev/zero: this is a device"));
+}
+
+#[test]
 fn many_scans_settle_at_the_clamps() {
     let mut map = empty(&params());
     let (robot, scan) = (Pose2::new(0.3, -0.2, 0.7), turning());

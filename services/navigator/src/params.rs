@@ -10,6 +10,7 @@ use std::time::Duration;
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// World file with doors, home and elevator; empty for none, and then every order is refused.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// The place where coffee is taken aboard and where the robot waits for orders.
     pub home: String,

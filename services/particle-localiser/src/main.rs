@@ -17,6 +17,8 @@ fn main() -> ExitCode {
         node.wake_on(&odometry);
         node.wake_on(&scans);
         node.every(Duration::from_millis(100));
+        Map::check(&params)?;
+        node.declared()?;
         let map = Map::load(&params)?;
         let mut kept = node.kept::<Option<Snapshot>>();
         let mut localiser = ParticleLocaliser::new(params, map, node.seed())?;

@@ -1,12 +1,12 @@
 //! What particles are compared with: walls as lines or as cells, in a frame of the map's own.
 
-use crate::params::{Params, ParamsError};
+use crate::params::{Model, Params, ParamsError};
 use crate::random::{Purpose, Stream};
 use geometry::{Cell, Grid, GridFrame, Occupancy, OccupancyGrid, Point2, Polygon, Pose2, Segment, World};
 use std::f32::consts::PI;
 
-/// A map. Its own frame begins at the grid's outer corner and follows its rows and columns, so that single precision is enough
-/// wherever on earth the map lies.
+/// A map. Its own frame begins at the grid's outer corner and follows its rows and columns, so that single
+/// precision is enough wherever on earth the map lies.
 #[derive(Debug, Clone)]
 pub struct Map {
     /// The frame of the map's file in which the own frame lies.
@@ -47,7 +47,8 @@ impl Map {
         Self::of_walls(&walls, &walls, resolution_m)
     }
 
-    /// One floor of a world. The robot is inside of the outline, or, where there is none, anywhere among the walls.
+    /// One floor of a world. The robot is inside of the outline, or, where there is none, anywhere among the
+    /// walls.
     pub fn of_world(world: &World, floor: i32, resolution_m: f64) -> Result<Self, ParamsError> {
         let walls = world.wall_segments(floor);
         let outline = world.floor(floor).and_then(|floor| floor.outline.as_ref());
@@ -59,17 +60,7 @@ impl Map {
     }
 
     fn of_walls(walls: &[Segment], outline: &[Segment], resolution_m: f64) -> Result<Self, ParamsError> {
-        let ends = || walls.iter().flat_map(|wall| [wall.a, wall.b]);
-        let low = ends().fold([f64::MAX; 2], |low, end| [low[0].min(end.x), low[1].min(end.y)]);
-        let high = ends().fold([f64::MIN; 2], |high, end| [high[0].max(end.x), high[1].max(end.y)]);
-        let (low, high) = if walls.is_empty() { ([0.0; 2], [0.0; 2]) } else { (low, high) };
-        let margin_m = f64::from(MARGIN) * resolution_m;
-        let origin = Pose2::new(low[0] - margin_m, low[1] - margin_m, 0.0);
-        let cells = |low: f64, high: f64| ((high - low) / resolution_m).ceil() as u32 + 2 * MARGIN + 1;
-        let bad_grid = |cause| ParamsError::Grid { resolution_m, cause };
-        let frame =
-            GridFrame::new(cells(low[0], high[0]), cells(low[1], high[1]), resolution_m, Pose2::IDENTITY)
-                .map_err(bad_grid)?;
+        let (origin, frame) = frame_around(walls, resolution_m)?;
         let walls: Vec<Segment> = walls.iter().map(|wall| wall.transformed(origin.inverse())).collect();
         let outline: Vec<Segment> = outline.iter().map(|wall| wall.transformed(origin.inverse())).collect();
         let mut drawn = Grid::filled(frame, Occupancy::FREE);
@@ -141,7 +132,23 @@ impl Map {
         Stream::new(seed, epoch, if is_start { Purpose::Start } else { Purpose::Scatter })
     }
 
-    /// Reads the world or the map that the parameters name: a map is a world when it ends in `.toml`, else of the kind of ROS.
+    /// Whether the world or the map that the parameters name can be used; of a map only the head is read.
+    pub fn check(params: &Params) -> Result<(), MapLoadError> {
+        let file = if params.world.is_empty() { params.map.as_str() } else { params.world.as_str() };
+        if file.is_empty() {
+            return Ok(());
+        }
+        if file.ends_with(".toml") {
+            let walls = World::load(file)?.wall_segments(params.floor);
+            frame_around(&walls, params.world_resolution_m)?;
+            return Ok(());
+        }
+        OccupancyGrid::look(file)?;
+        if params.model == Model::Echo { Err(ParamsError::NoLines.into()) } else { Ok(()) }
+    }
+
+    /// Reads the world or the map that the parameters name: a map is a world when it ends in `.toml`, else of
+    /// the kind of ROS.
     pub fn load(params: &Params) -> Result<Self, MapLoadError> {
         let file = if params.world.is_empty() { params.map.as_str() } else { params.world.as_str() };
         if file.is_empty() {
@@ -153,6 +160,19 @@ impl Map {
         }
         Ok(Self::of_grid(&OccupancyGrid::load(file)?, params.occupied_percent))
     }
+}
+
+/// The grid that is made around the walls of a world, and where it lies there.
+fn frame_around(walls: &[Segment], resolution_m: f64) -> Result<(Pose2, GridFrame), ParamsError> {
+    let ends = || walls.iter().flat_map(|wall| [wall.a, wall.b]);
+    let low = ends().fold([f64::MAX; 2], |low, end| [low[0].min(end.x), low[1].min(end.y)]);
+    let high = ends().fold([f64::MIN; 2], |high, end| [high[0].max(end.x), high[1].max(end.y)]);
+    let (low, high) = if walls.is_empty() { ([0.0; 2], [0.0; 2]) } else { (low, high) };
+    let margin_m = f64::from(MARGIN) * resolution_m;
+    let origin = Pose2::new(low[0] - margin_m, low[1] - margin_m, 0.0);
+    let cells = |axis: usize| ((high[axis] - low[axis]) / resolution_m).ceil() as u32 + 2 * MARGIN + 1;
+    let frame = GridFrame::new(cells(0), cells(1), resolution_m, Pose2::IDENTITY);
+    Ok((origin, frame.map_err(|cause| ParamsError::Grid { resolution_m, cause })?))
 }
 
 /// Why a map cannot be read.

@@ -178,8 +178,10 @@ fn start_sigma_rad() -> f64 {
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// Map of the kind of ROS (the YAML file), or a world file (`.toml`); empty for none, and then no pose is ever found.
+    #[schemars(extend("format" = "path"))]
     pub map: String,
     /// World file used instead of a map; empty for none.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// The floor of a world file.
     pub floor: i32,

@@ -25,6 +25,7 @@ pub struct Params {
     /// What is judged.
     pub mode: Mode,
     /// The world file, relative to the working directory; empty for an empty plane.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// The truth is looked at so often.
     #[schemars(range(min = 10, max = 1000))]

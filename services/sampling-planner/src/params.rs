@@ -11,6 +11,7 @@ use std::time::Duration;
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// World file with the floors' walls; empty for none.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// The offset by which the floor is shrunk: no point of a path comes nearer to a wall. Half the robot's length (NXT-070, X-09).
     #[schemars(range(min = 0.0, max = 2.0))]

@@ -23,6 +23,7 @@ pub enum MotionErrors {
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// The world file, relative to the working directory; empty for an empty plane.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// Which of the file's starts is the robot's.
     pub robot: String,

@@ -22,6 +22,7 @@ pub struct Params {
     /// What measures.
     pub device: Device,
     /// The world file with the anchors, relative to the working directory; empty for none.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// From message to message; the module manages ten a second.
     #[schemars(range(min = 100, max = 10000))]

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// World file with the walls that the side sensors are compared with; empty for none.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// Pose at the start, where it is known; without it the first ranges and a short drive find it.
     pub start: Option<Start>,

@@ -49,6 +49,7 @@ pub struct Params {
     /// What measures.
     pub device: Device,
     /// The world file of the simulated device, relative to the working directory; empty for an empty plane.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// From frame to frame. All sensors range at the same time (X-2C).
     #[schemars(range(min = 24, max = 1000))]

@@ -36,6 +36,7 @@ pub struct Params {
     /// What measures.
     pub device: Device,
     /// The world file of the simulated device, relative to the working directory; empty for an empty plane.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// From step to step, and from one look ahead to the next.
     #[schemars(range(min = 5, max = 200))]

@@ -1,7 +1,11 @@
-//! The part of YAML that map files use: one level of `key: value`, where a value is a word, a quoted text, or a list of
-//! numbers in brackets or on lines of their own.
+//! The keys of a map's YAML. Only values that can mean something to a map are kept: a word, a text, or a flat
+//! list of them. Whatever else stands below a key is skipped, however deep, and never expanded.
 
-/// A value and where it stands.
+use saphyr_parser::{Event, Parser, ScanError, StrInput};
+use std::borrow::Cow;
+use std::collections::HashMap;
+
+/// A key with its value, and where the key stands.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Entry {
     pub(super) key: String,
@@ -14,6 +18,8 @@ pub(super) struct Entry {
 pub(super) enum Value {
     Text(String),
     List(Vec<String>),
+    /// A table, or a list of lists: nothing that a map's keys take.
+    Other,
 }
 
 /// What is wrong, and in which line.
@@ -23,125 +29,163 @@ pub(super) struct YamlError {
     pub(super) problem: String,
 }
 
-/// Reads the entries of a text, in their order.
+/// Longer lists are no list of a map, and are skipped.
+const LONGEST_LIST: usize = 16;
+
+/// Reads the entries of the first document of a text, in their order.
 pub(super) fn parse(text: &str) -> Result<Vec<Entry>, YamlError> {
+    let text = without_tabs_after_keys(text);
+    let mut reader = Reader { events: Parser::new_from_str(&text), anchors: HashMap::new() };
     let mut entries: Vec<Entry> = Vec::new();
-    let mut lines = text.trim_start_matches('\u{feff}').lines().enumerate();
-    while let Some((index, raw)) = lines.next() {
-        let line = index + 1;
-        let fail = |problem: &str| YamlError { line, problem: problem.to_owned() };
-        let content = without_comment(raw).trim_end();
-        if content.trim().is_empty() || (entries.is_empty() && (content == "---" || content.starts_with('%')))
-        {
-            continue;
-        }
-        if content == "..." || content == "---" {
-            break;
-        }
-        if let Some(item) = content.trim_start().strip_prefix("- ") {
-            let Some(Entry { value: Value::List(list), .. }) = entries.last_mut() else {
-                return Err(fail("a list item that belongs to no key"));
-            };
-            list.push(scalar(item).map_err(|problem| fail(&problem))?);
-            continue;
-        }
-        if content.starts_with([' ', '\t']) {
-            return Err(fail("an indented line: only `key: value` is understood"));
-        }
-        let (key, mut rest) = split_key(content).ok_or_else(|| fail("this is not `key: value`"))?;
-        let key = scalar(key).map_err(|problem| fail(&problem))?;
-        if entries.iter().any(|entry| entry.key == key) {
-            return Err(fail(&format!("{key} is given twice")));
-        }
-        let mut joined = String::new();
-        if rest.starts_with('[') && !rest.ends_with(']') {
-            joined.push_str(rest);
-            while !joined.trim_end().ends_with(']') {
-                let (_, more) = lines.next().ok_or_else(|| fail("a list without its closing bracket"))?;
-                joined.push(' ');
-                joined.push_str(without_comment(more).trim());
+    loop {
+        match reader.next()? {
+            (Event::StreamStart | Event::DocumentStart(_) | Event::Nothing, _) => {}
+            (Event::MappingStart(..), _) => break,
+            (Event::StreamEnd | Event::DocumentEnd, _) => return Ok(entries),
+            // A file of comments alone.
+            (Event::Scalar(text, ..), _) if text.is_empty() => return Ok(entries),
+            (_, line) => {
+                return Err(YamlError { line, problem: "this is not `key: value`".to_owned() });
             }
-            rest = joined.trim_end();
         }
-        let value = if let Some(inner) = rest.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')) {
-            let items = inner.trim().trim_end_matches(',');
-            let items = items.split(',').filter(|_| !items.trim().is_empty()).map(scalar);
-            Value::List(items.collect::<Result<_, _>>().map_err(|problem| fail(&problem))?)
-        } else if rest.is_empty() {
-            // Items on the following lines, or nothing at all.
-            Value::List(Vec::new())
-        } else {
-            Value::Text(scalar(rest).map_err(|problem| fail(&problem))?)
+    }
+    loop {
+        let (event, line) = reader.next()?;
+        let key = match event {
+            Event::MappingEnd => return Ok(entries),
+            Event::Scalar(key, ..) => key.into_owned(),
+            other => {
+                // A key that is no word means nothing to a map.
+                reader.value(other)?;
+                let (value, _) = reader.next()?;
+                reader.value(value)?;
+                continue;
+            }
         };
+        if entries.iter().any(|entry| entry.key == key) {
+            return Err(YamlError { line, problem: format!("{key} is given twice") });
+        }
+        let (event, _) = reader.next()?;
+        let value = reader.value(event)?;
         entries.push(Entry { key, value, line });
     }
-    Ok(entries)
 }
 
-fn split_key(content: &str) -> Option<(&str, &str)> {
-    let end = content.find(": ").or_else(|| content.strip_suffix(':').map(str::len))?;
-    Some((&content[..end], content[end + 1..].trim()))
+struct Reader<'a> {
+    events: Parser<'a, StrInput<'a>>,
+    /// What stands at each anchor.
+    anchors: HashMap<usize, Value>,
 }
 
-/// The line up to a `#` that begins it or follows a space, outside of quotes.
-fn without_comment(line: &str) -> &str {
-    let mut quote = None;
-    let mut before = ' ';
-    let mut escaped = false;
-    for (at, letter) in line.char_indices() {
-        match quote {
-            Some('"') if escaped => escaped = false,
-            Some('"') if letter == '\\' => escaped = true,
-            Some(open) if letter == open => quote = None,
-            Some(_) => {}
-            None if letter == '#' && before.is_whitespace() => return &line[..at],
-            None if matches!(letter, '"' | '\'')
-                && (before.is_whitespace() || matches!(before, '[' | ',')) =>
-            {
-                quote = Some(letter);
+impl<'a> Reader<'a> {
+    /// The next event and its line.
+    fn next(&mut self) -> Result<(Event<'a>, usize), YamlError> {
+        match self.events.next_event() {
+            Some(Ok((event, span))) => Ok((event, span.start.line())),
+            Some(Err(error)) => Err(no_yaml(&error)),
+            None => Ok((Event::StreamEnd, 0)),
+        }
+    }
+
+    /// The value that begins with an event, to its end.
+    fn value(&mut self, first: Event<'a>) -> Result<Value, YamlError> {
+        let (value, anchor) = match first {
+            Event::Scalar(text, _, anchor, _) => (Value::Text(text.into_owned()), anchor),
+            Event::Alias(anchor) => (self.anchors.get(&anchor).cloned().unwrap_or(Value::Other), 0),
+            Event::SequenceStart(anchor, _) => (self.list()?, anchor),
+            Event::MappingStart(anchor, _) => {
+                self.skip_to_end()?;
+                (Value::Other, anchor)
             }
-            None => {}
+            _ => (Value::Other, 0),
+        };
+        if anchor > 0 {
+            self.anchors.insert(anchor, value.clone());
         }
-        before = letter;
+        Ok(value)
     }
-    line
+
+    fn list(&mut self) -> Result<Value, YamlError> {
+        let mut items = Vec::new();
+        loop {
+            match self.next()?.0 {
+                Event::SequenceEnd => return Ok(Value::List(items)),
+                Event::Scalar(text, _, anchor, _) if items.len() < LONGEST_LIST => {
+                    if anchor > 0 {
+                        self.anchors.insert(anchor, Value::Text(text.clone().into_owned()));
+                    }
+                    items.push(text.into_owned());
+                }
+                Event::Alias(anchor) if matches!(self.anchors.get(&anchor), Some(Value::Text(_))) => {
+                    if let Some(Value::Text(text)) = self.anchors.get(&anchor)
+                        && items.len() < LONGEST_LIST
+                    {
+                        items.push(text.clone());
+                    }
+                }
+                Event::StreamEnd => return Ok(Value::Other),
+                other => {
+                    let begins = matches!(other, Event::SequenceStart(..) | Event::MappingStart(..));
+                    if begins {
+                        self.skip_to_end()?;
+                    }
+                    self.skip_to_end()?;
+                    return Ok(Value::Other);
+                }
+            }
+        }
+    }
+
+    /// Skips to the end of the list or table that is open.
+    fn skip_to_end(&mut self) -> Result<(), YamlError> {
+        let mut open = 1_usize;
+        while open > 0 {
+            match self.next()?.0 {
+                Event::SequenceStart(..) | Event::MappingStart(..) => open += 1,
+                Event::SequenceEnd | Event::MappingEnd => open -= 1,
+                Event::StreamEnd => return Ok(()),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
 }
 
-/// A plain word, or a text in single or double quotes.
-fn scalar(text: &str) -> Result<String, String> {
-    let text = text.trim();
-    if let Some(rest) = text.strip_prefix('\'') {
-        let inner = rest.strip_suffix('\'').ok_or_else(|| format!("{text} has no closing quote"))?;
-        return Ok(inner.replace("''", "'"));
+/// The same text with a blank for each tab between a key and its value, which the parser does not take for
+/// white space.
+fn without_tabs_after_keys(text: &str) -> Cow<'_, str> {
+    if !text.contains(":\t") {
+        return Cow::Borrowed(text);
     }
-    let Some(rest) = text.strip_prefix('"') else {
-        let special = text.starts_with(['&', '*', '!', '|', '>', '{', '}', '[', ']', '@', '`']);
-        return if special { Err(format!("{text:?} is not understood here")) } else { Ok(text.to_owned()) };
+    let mend = |line: &str| match line.split_once(":\t") {
+        Some((key, value))
+            if key.chars().all(|letter| letter.is_alphanumeric() || " _\"'".contains(letter)) =>
+        {
+            let bare = value.trim_start_matches('\t');
+            format!("{key}:{}{bare}", " ".repeat(1 + value.len() - bare.len()))
+        }
+        _ => line.to_owned(),
     };
-    let mut plain = String::new();
-    let mut letters = rest.chars();
-    loop {
-        match letters.next() {
-            None => return Err(format!("{text} has no closing quote")),
-            Some('"') => break,
-            Some('\\') => match letters.next() {
-                Some('n') => plain.push('\n'),
-                Some('t') => plain.push('\t'),
-                Some(letter @ ('\\' | '"' | '/')) => plain.push(letter),
-                other => return Err(format!("the escape \\{} is not understood", other.unwrap_or(' '))),
-            },
-            Some(letter) => plain.push(letter),
-        }
-    }
-    if letters.as_str().is_empty() {
-        Ok(plain)
-    } else {
-        Err(format!("text after the closing quote of {text}"))
-    }
+    Cow::Owned(text.split_inclusive('\n').map(mend).collect())
 }
 
-/// A text in double quotes that [`scalar`] reads back.
+fn no_yaml(error: &ScanError) -> YamlError {
+    let marker = error.marker();
+    let problem = format!("no YAML: {} (column {})", error.info(), marker.col() + 1);
+    YamlError { line: marker.line(), problem }
+}
+
+/// A text in double quotes that reads back as it is.
 pub(super) fn quoted(text: &str) -> String {
-    let escaped = text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n").replace('\t', "\\t");
-    format!("\"{escaped}\"")
+    let mut quoted = String::from("\"");
+    for letter in text.chars() {
+        match letter {
+            '"' | '\\' => quoted.extend(['\\', letter]),
+            letter if letter.is_control() || letter == '\u{feff}' => {
+                quoted.push_str(&format!("\\u{:04x}", u32::from(letter)));
+            }
+            letter => quoted.push(letter),
+        }
+    }
+    quoted + "\""
 }

@@ -1,5 +1,6 @@
 use crate::world::{Door, DoorGeometry, World};
 use crate::{Point2, Pose2, Segment};
+use proptest::prelude::*;
 
 const EXAMPLE: &str = include_str!("../../tests/example-world.toml");
 
@@ -57,6 +58,75 @@ fn the_example_says_what_it_says() {
 fn a_world_survives_its_own_text() {
     let text = toml::to_string(&example()).expect("plain data");
     assert_eq!(World::parse(&text).expect("its own text"), example());
+}
+
+#[test]
+fn files_are_plain_and_bounded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let told = |path: &std::path::Path, words: &str| {
+        let error = World::load(path).expect_err(words).to_string();
+        assert!(error.starts_with("cannot read the world file ") && error.contains(words), "{error}");
+    };
+    told(std::path::Path::new("/dev/zero"), "this is a device");
+    told(folder.path(), "this is a folder");
+    let file = folder.path().join("w.toml");
+    std::fs::write(&file, vec![b'#'; 3 << 20]).expect("written");
+    told(&file, "it has 3 MiB, more than 2 MiB");
+    std::fs::write(&file, b"name = \"caf\xe9\"").expect("written");
+    told(&file, "line 1, byte 12: the byte 0xe9 is no UTF-8");
+    std::fs::write(&file, format!("\u{feff}{EXAMPLE}")).expect("written");
+    assert_eq!(World::load(&file).expect("the example"), example());
+}
+
+#[test]
+fn more_than_any_building_has_is_refused() {
+    let floor = "name = \"w\"\n[[floor]]\nnumber = 1\n";
+    let many = |count: usize, item: fn(usize) -> String| (0..count).map(item).collect::<String>();
+    let walls = |count| format!("{floor}walls = [{}]", many(count, |n| format!("[[0, {n}], [1, {n}]],")));
+    assert!(World::parse(&walls(10_000)).is_ok());
+    refused(&walls(10_001), "world: 20002 points of walls are more than the 20000 that a world may hold");
+    let places = |count| {
+        format!(
+            "{floor}{}",
+            many(count, |n| format!(
+                "[[place]]\nname = \"p{n}\"\nfloor = 1\npose = {{ x_m = 0, y_m = 0, heading_rad = 0 }}\n"
+            ))
+        )
+    };
+    assert!(World::parse(&places(1000)).is_ok());
+    refused(&places(1001), "1001 places are more than the 1000");
+    refused(
+        &many(1001, |n| format!("[[floor]]\nnumber = {n}\n")).replacen("[[", "name = \"w\"\n[[", 1),
+        "1001 floors",
+    );
+    let corners = many(1001, |n| format!("[{n}, {}],", n % 2));
+    refused(
+        &format!("{floor}outline = [{corners}]"),
+        "floor 1: 1001 corners of an outline are more than the 1000",
+    );
+    refused_with(
+        &format!("[[area]]\nname = \"a\"\nfloor = 2\nkind = \"measure\"\npolygon = [{corners}]"),
+        "1001 corners of an area",
+    );
+    refused_with(
+        &format!("[[walker]]\nname = \"w2\"\nfloor = 2\npath = [{corners}]"),
+        "1001 points of a path",
+    );
+}
+
+#[test]
+fn what_a_robot_is_to_reach_lies_within_the_outline() {
+    let arena = "name = \"a\"\n[[floor]]\nnumber = 0\noutline = [[0, 0], [2, 0], [2, 1], [0, 1]]\n";
+    let pose = |x: f64| format!("floor = 0\npose = {{ x_m = {x}, y_m = 0.5, heading_rad = 0 }}\n");
+    assert!(World::parse(&format!("{arena}[[start]]\n{}", pose(1.9))).is_ok());
+    refused(
+        &format!("{arena}[[start]]\n{}", pose(2.1)),
+        "line 5: start \"of any robot\": (2.1, 0.5) lies outside of the outline of floor 0",
+    );
+    refused(
+        &format!("{arena}[[place]]\nname = \"p\"\n{}", pose(-0.1)),
+        "place \"p\": (-0.1, 0.5) lies outside",
+    );
 }
 
 #[test]
@@ -162,4 +232,29 @@ fn nonsense_is_refused() {
 fn an_unreadable_file_is_named() {
     let error = World::load("/nonexistent/world.toml").expect_err("there is none").to_string();
     assert!(error.contains("/nonexistent/world.toml"), "{error}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(60))]
+    #[test]
+    fn a_damaged_world_is_read_or_refused(
+        at: prop::sample::Index, length in 0..30_usize, with in "[0-9\\-\\[\\]{}=\"#, \na-e.]{0,12}", number: prop::sample::Index,
+        value in prop::sample::select(vec!["0.0", "-1.0", "1e9", "1e300", "nan", "inf", "-0.0", "1e-300", "16777216"]),
+    ) {
+        let mut pieces = vec![EXAMPLE.to_owned(); 2];
+        let begin = at.index(EXAMPLE.len());
+        if EXAMPLE.is_char_boundary(begin) && EXAMPLE.is_char_boundary((begin + length).min(EXAMPLE.len())) {
+            pieces[0].replace_range(begin..(begin + length).min(EXAMPLE.len()), &with);
+        }
+        let numbers: Vec<_> = EXAMPLE.match_indices(|letter: char| letter.is_ascii_digit()).map(|(at, _)| at).collect();
+        let digit = *number.get(&numbers);
+        pieces[1].replace_range(digit..digit + 1, value);
+        for text in pieces {
+            let Ok(world) = World::parse(&text) else { continue };
+            for floor in &world.floors {
+                let _ = world.wall_segments(floor.number).len() + world.openings_of(floor.number).count();
+                let _ = world.scene(floor.number);
+            }
+        }
+    }
 }

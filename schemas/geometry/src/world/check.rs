@@ -10,6 +10,14 @@ use toml::Spanned;
 /// Farther out than this no coordinate lies, in metres.
 const FARTHEST_M: f64 = 10_000.0;
 
+/// As much as no building has that a robot drives through, and little enough that each thing can be compared
+/// with every other.
+const MOST_OF_A_KIND: usize = 1000;
+/// Straight pieces of wall of a whole world.
+const MOST_WALLS: usize = 20_000;
+/// Corners of one outline or area, or points of one path.
+const MOST_POINTS: usize = 1000;
+
 /// The first thing that is wrong.
 #[derive(Debug)]
 pub(super) struct Found {
@@ -67,6 +75,7 @@ impl World {
         };
         let at_all = |problem| Box::new(Found { list: "world", index: 0, item: "world".into(), problem });
         (if self.floors.is_empty() { Err(WorldProblem::NoFloor) } else { Ok(()) }).map_err(at_all)?;
+        self.is_bounded().map_err(at_all)?;
 
         let mut numbers = HashSet::new();
         for (index, floor) in self.floors.iter().enumerate() {
@@ -74,6 +83,7 @@ impl World {
             fresh(numbers.insert(floor.number), || format!("floor {}", floor.number)).map_err(&fail)?;
             if let Some(corners) = &floor.outline {
                 coordinates("outline", corners).map_err(&fail)?;
+                at_most("corners of an outline", corners.len(), MOST_POINTS).map_err(&fail)?;
             }
             if floor.outline.is_some() && floor.outline_polygon().is_none() {
                 let cause = crate::Polygon::from_coordinates(floor.outline.as_deref().unwrap_or_default());
@@ -117,6 +127,7 @@ impl World {
             positive("travel_s", lift.travel_s).map_err(&fail)?;
             positive("door_s", lift.door_s).map_err(&fail)?;
             not_negative("open_s", lift.open_s).map_err(&fail)?;
+            at_most("floors of an elevator", lift.floors.len(), MOST_OF_A_KIND).map_err(&fail)?;
             if lift.floors.is_empty() {
                 return Err(fail(WorldProblem::TooFewPoints { field: "floors", points: 0, wanted: 1 }));
             }
@@ -138,6 +149,8 @@ impl World {
                 let problem = "an area has either a rectangle or a polygon";
                 return Err(fail(WorldProblem::Contradiction { problem }));
             }
+            let corners = area.polygon.as_ref().map_or(0, Vec::len);
+            at_most("corners of an area", corners, MOST_POINTS).map_err(&fail)?;
             let shape = area.shape().map_err(|cause| WorldProblem::BadPolygon { field: "its shape", cause });
             let corners: Vec<_> = shape.map_err(&fail)?.corners().iter().map(|p| [p.x, p.y]).collect();
             coordinates("its shape", &corners).map_err(&fail)?;
@@ -149,6 +162,7 @@ impl World {
             let new = !rooms.contains(place.name.as_str()) && names.insert(place.name.as_str());
             fresh(new, || place.name.clone()).map_err(&fail)?;
             self.known(place.floor).and_then(|()| pose(place.pose)).map_err(&fail)?;
+            self.inside(place.floor, place.pose).map_err(&fail)?;
         }
         let mut ids = HashSet::new();
         for (index, anchor) in self.anchors.iter().enumerate() {
@@ -174,6 +188,7 @@ impl World {
             named(&walker.name).map_err(&fail)?;
             fresh(names.insert(walker.name.as_str()), || walker.name.clone()).map_err(&fail)?;
             self.known(walker.floor).map_err(&fail)?;
+            at_most("points of a path", walker.path.len(), MOST_POINTS).map_err(&fail)?;
             polyline("path", &walker.path, 1).map_err(&fail)?;
             positive("radius_m", walker.radius_m).map_err(&fail)?;
             positive("speed_m_s", walker.speed_m_s).map_err(&fail)?;
@@ -185,8 +200,36 @@ impl World {
             let fail = about("start", index, format!("{who:?}"));
             fresh(names.insert(start.robot.as_deref()), || who.to_owned()).map_err(&fail)?;
             self.known(start.floor).and_then(|()| pose(start.pose)).map_err(&fail)?;
+            self.inside(start.floor, start.pose).map_err(&fail)?;
         }
         Ok(())
+    }
+
+    fn is_bounded(&self) -> Check {
+        let counts = [
+            ("floors", self.floors.len()),
+            ("doors", self.doors.len()),
+            ("elevators", self.elevators.len()),
+            ("areas", self.areas.len()),
+            ("places", self.places.len()),
+            ("anchors", self.anchors.len()),
+            ("pieces of furniture", self.furniture.len()),
+            ("walkers", self.walkers.len()),
+            ("starts", self.starts.len()),
+        ];
+        counts.into_iter().try_for_each(|(what, count)| at_most(what, count, MOST_OF_A_KIND))?;
+        let outlines = self.floors.iter().filter_map(|floor| floor.outline.as_ref());
+        let walls = self.floors.iter().flat_map(|floor| &floor.walls);
+        let points: usize = outlines.chain(walls).map(Vec::len).sum();
+        at_most("points of walls", points, MOST_WALLS)
+    }
+
+    /// Where a floor has an outline, what a robot is to reach lies inside.
+    fn inside(&self, floor: i32, pose: Pose2) -> Check {
+        let outline = self.floor(floor).and_then(super::Floor::outline_polygon);
+        let is_inside = outline.is_none_or(|outline| outline.contains(pose.position()));
+        let outside = WorldProblem::OutsideOutline { floor, x_m: pose.x_m, y_m: pose.y_m };
+        if is_inside { Ok(()) } else { Err(outside) }
     }
 
     fn known(&self, floor: i32) -> Check {
@@ -223,6 +266,10 @@ fn claim(gaps: &mut Vec<(i32, Segment, String)>, floor: i32, gap: Segment, who: 
     }
     gaps.push((floor, gap, who));
     Ok(())
+}
+
+fn at_most(what: &'static str, count: usize, most: usize) -> Check {
+    if count <= most { Ok(()) } else { Err(WorldProblem::TooMany { what, count, most }) }
 }
 
 fn fresh(new: bool, what: impl Fn() -> String) -> Check {

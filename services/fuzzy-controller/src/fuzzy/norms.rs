@@ -75,8 +75,8 @@ pub enum Hedge {
 }
 
 impl TNorm {
-    /// Every norm with its FCL keyword, the preferred spelling first.
-    pub const KEYWORDS: [(&'static str, Self); 7] = [
+    /// Every norm with its FCL keyword, the preferred spelling first, jFuzzyLogic's last.
+    pub const KEYWORDS: [(&'static str, Self); 10] = [
         ("MIN", Self::Minimum),
         ("PROD", Self::Product),
         ("BDIF", Self::BoundedDifference),
@@ -84,6 +84,9 @@ impl TNorm {
         ("EPROD", Self::EinsteinProduct),
         ("HPROD", Self::HamacherProduct),
         ("NMIN", Self::NilpotentMinimum),
+        ("DMIN", Self::DrasticProduct),
+        ("HAMACHER", Self::HamacherProduct),
+        ("NIPMIN", Self::NilpotentMinimum),
     ];
 
     /// The norm of two degrees in [0, 1].
@@ -116,8 +119,8 @@ impl TNorm {
 }
 
 impl SNorm {
-    /// Every conorm with its FCL keyword, the preferred spelling first.
-    pub const KEYWORDS: [(&'static str, Self); 10] = [
+    /// Every conorm with its FCL keyword, the preferred spelling first, jFuzzyLogic's last.
+    pub const KEYWORDS: [(&'static str, Self); 13] = [
         ("MAX", Self::Maximum),
         ("ASUM", Self::AlgebraicSum),
         ("PROBOR", Self::AlgebraicSum),
@@ -128,6 +131,9 @@ impl SNorm {
         ("ESUM", Self::EinsteinSum),
         ("HSUM", Self::HamacherSum),
         ("NMAX", Self::NilpotentMaximum),
+        ("DMAX", Self::DrasticSum),
+        ("EINSTEIN", Self::EinsteinSum),
+        ("NIPMAX", Self::NilpotentMaximum),
     ];
 
     /// The conorm of two degrees in [0, 1].

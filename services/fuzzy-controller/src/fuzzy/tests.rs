@@ -264,6 +264,209 @@ fn errors_carry_their_place() {
 }
 
 #[track_caller]
+fn refuses_with(from: &str, to: &str, line: usize, column: usize, words: &str) {
+    let kind = refuses(from, to, line, column).to_string();
+    assert!(kind.contains(words), "{kind}");
+}
+
+#[test]
+fn what_is_given_twice_is_refused() {
+    refuses_with("AND : MIN;", "AND : MIN; AND : PROD;", 22, 14, "AND is given twice here");
+    refuses_with("OR : MAX;", "OR : MAX; OR : MAX;", 22, 24, "OR is given twice here");
+    refuses_with("ACT : MIN;", "ACT : MIN; ACT : PROD;", 22, 35, "ACT is given twice here");
+    refuses_with("ACT : MIN;", "ACCU : MAX; ACCU : MAX;", 22, 36, "ACCU is given twice here");
+    refuses_with("METHOD : COG;", "METHOD : COG; METHOD : COA;", 19, 17, "METHOD is given twice here");
+    refuses_with("ACCU : MAX;", "ACCU : MAX; ACCU : MAX;", 19, 29, "ACCU is given twice here");
+    refuses_with("DEFAULT := 7 | NC;", "DEFAULT := 7; DEFAULT := NC;", 19, 43, "DEFAULT is given twice here");
+    refuses_with(
+        "LOCK : RANGE;\nEND_D",
+        "LOCK : RANGE; LOCK : RANGE;\nEND_D",
+        19,
+        62,
+        "LOCK is given twice here",
+    );
+    refuses_with(
+        "RANGE := (0 .. 100);",
+        "RANGE := (0 .. 100); RANGE := (0 .. 9);",
+        15,
+        24,
+        "RANGE is given twice here",
+    );
+    refuses_with(
+        "RANGE := (-10..40);",
+        "RANGE := (-10..40); RANGE := (0 .. 9);",
+        5,
+        23,
+        "RANGE is given twice here",
+    );
+    refuses_with(
+        "FUZZIFY h",
+        "FUZZIFY t END_FUZZIFY FUZZIFY h",
+        10,
+        9,
+        "FUZZIFY of this variable is given twice",
+    );
+    refuses_with(
+        "RULEBLOCK one",
+        "DEFUZZIFY fan END_DEFUZZIFY RULEBLOCK one",
+        21,
+        11,
+        "DEFUZZIFY of this variable is given twice",
+    );
+}
+
+#[test]
+fn comments_do_not_nest() {
+    let told = "comments do not nest: the one that begins in line 1, column 21, ended in line 1, column 32";
+    refuses_with("(* every form *)", "(* a (* b *) *)", 1, 34, told);
+    refuses_with("(* every form *)", "/* a /* b */ */", 1, 34, told);
+    refuses_with(
+        "FUNCTION_BLOCK heat (* every form *)",
+        "FUNCTION_BLOCK heat *)",
+        1,
+        21,
+        "a comment ends here that has not begun",
+    );
+    // One kind within the other is text.
+    let text = SYSTEM.replace("(* every form *)", "(* // /* a *) /* (* */ // (* /*");
+    assert_eq!(fcl::read(&text), fcl::read(SYSTEM));
+}
+
+#[track_caller]
+fn same_condition(a: &str, b: &str) {
+    let condition = |condition: &str| {
+        let system = fcl::read(&SYSTEM.replace("t IS hot", condition)).expect(condition);
+        assert_eq!(fcl::read(&fcl::write(&system)), Ok(system.clone()), "{condition}");
+        let mut engine = Engine::new(&system, Options::default()).expect(condition);
+        [(15.0, 0.2), (25.0, 0.7), (5.0, 0.5)].map(|(t, h)| {
+            engine.step(&[t, h]);
+            engine.activations()[2].to_bits()
+        })
+    };
+    assert_eq!(condition(a), condition(b), "{a} is not {b}");
+}
+
+#[test]
+fn hedges_are_those_of_fuzzylite() {
+    same_condition("t IS any", "t IS any hot");
+    same_condition("t IS any", "t IS any cold");
+    same_condition("t IS very any", "t IS any");
+    same_condition("t IS not any", "t IS not any cold");
+    same_condition("NOT t IS any", "t IS not any");
+    same_condition("t IS any AND h IS dry", "h IS dry");
+    same_condition("t IS any OR h IS dry", "t IS any");
+    same_condition("(t IS any) AND (h IS ANY) AND h IS wet", "h IS wet");
+    same_condition("t IS very very hot", "t IS very very hot");
+    same_condition("t IS not very hot", "NOT t IS very hot");
+    // A term of that name goes before the hedge.
+    let named = SYSTEM.replace("TERM hot", "TERM any").replace("t IS hot", "t IS any");
+    assert_eq!(
+        fcl::read(&named).map(|system| system.blocks[0].rules[2].condition.clone()),
+        Ok(Condition::Is { input: 0, hedges: vec![], term: 2 })
+    );
+    let bare = "FUNCTION_BLOCK b VAR_INPUT x : REAL; END_VAR VAR_OUTPUT y : REAL; END_VAR DEFUZZIFY y TERM a := 1; END_DEFUZZIFY
+         RULEBLOCK RULE 1 : IF x IS any THEN y IS a; END_RULEBLOCK END_FUNCTION_BLOCK";
+    assert!(matches!(fcl::read(bare).unwrap_err().kind, FclErrorKind::AnyOfNothing(_)));
+    refuses_with("t IS hot", "t IS very", 25, 29, "variable t has no term THEN");
+}
+
+#[track_caller]
+fn same_system(a: &str, b: &str) {
+    assert!(SYSTEM.contains(a), "{a}");
+    assert_eq!(fcl::read(&SYSTEM.replacen(a, b, 1)), fcl::read(SYSTEM), "{b}");
+}
+
+#[test]
+fn other_ways_to_write_the_same() {
+    for number in ["+10", "1e1", "1.E1", "10.", "1_0", "10.0_0", "0.1e+2", "+ 10"] {
+        same_system("trian 10", &format!("trian {number}"));
+    }
+    for range in ["(- 10 .. 40)", "(-1_0..4_0)", "(-10.0..40.)", "(-.1e2..40)"] {
+        same_system("(-10..40)", range);
+    }
+    same_system("trian 10 20 30", "TRIANGLE 10 20 30");
+    same_system("Triangle -50 0 50", "Triangle - 50 0 50");
+    same_system("VAR_INPUT t, h : REAL; END_VAR", "VAR_INPUT t : REAL; h : REAL; END_VAR");
+    same_system("RULE 1 :", "rule 1.0:");
+    let declared =
+        SYSTEM.replace("RANGE := (0 .. 100);", "").replace("fan : REAL;", "fan : REAL; RANGE := (0 .. 100);");
+    assert_eq!(fcl::read(&declared), fcl::read(SYSTEM));
+    let range = SYSTEM
+        .replace("h : REAL", "range : REAL")
+        .replace("FUZZIFY h", "FUZZIFY range")
+        .replace("h IS", "range IS")
+        .replace("h is", "range is");
+    assert_eq!(fcl::read(&range).unwrap().inputs[1].name, "range");
+    refuses("trian 10 20", "trian 1__0 20", 7, 16);
+    refuses("trian 10 20", "trian - -10 20", 7, 16);
+    refuses("(-10..40)", "(- -10..40)", 5, 13);
+}
+
+#[test]
+fn the_norms_of_jfuzzylogic_are_read() {
+    for (name, norm) in [
+        ("DMIN", TNorm::DrasticProduct),
+        ("HAMACHER", TNorm::HamacherProduct),
+        ("NIPMIN", TNorm::NilpotentMinimum),
+    ] {
+        assert_eq!(
+            fcl::read(&SYSTEM.replace("AND : MIN", &format!("AND : {name}"))).unwrap().blocks[0].and,
+            Some(norm)
+        );
+    }
+    for (name, norm) in
+        [("DMAX", SNorm::DrasticSum), ("EINSTEIN", SNorm::EinsteinSum), ("NIPMAX", SNorm::NilpotentMaximum)]
+    {
+        assert_eq!(
+            fcl::read(&SYSTEM.replace("OR : MAX", &format!("OR : {name}"))).unwrap().blocks[0].or,
+            Some(norm)
+        );
+    }
+    let term = |text: &str| {
+        fcl::read(&SYSTEM.replace("trian 10 20 30", text)).unwrap().inputs[0].terms[1].term.clone()
+    };
+    assert_eq!(term("GAUSS2 1 2 4 1"), Term::GaussianProduct([1.0, 2.0, 4.0, 1.0]));
+    // The difference of two steps up, at 1 and at 4.
+    let steps = term("DSIGM 3 1 5 4");
+    let step = |x: f64, slope: f64, at: f64| 1.0 / (1.0 + (-slope * (x - at)).exp());
+    close(steps.membership(2.0), step(2.0, 3.0, 1.0) - step(2.0, 5.0, 4.0), 1e-12);
+}
+
+#[test]
+fn systems_are_bounded() {
+    let many = |count: usize, item: fn(usize) -> String| (0..count).map(item).collect::<String>();
+    let too_many = |from: &str, to: &str, words: &str| {
+        assert!(SYSTEM.contains(from), "{from}");
+        let error = fcl::read(&SYSTEM.replacen(from, to, 1)).expect_err(words).to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    too_many(
+        "VAR_INPUT",
+        &format!("VAR_INPUT {}", many(100, |n| format!("v{n} : REAL; "))),
+        "more than 100 variables",
+    );
+    too_many(
+        "TERM dry",
+        &format!("{}TERM dry", many(200, |n| format!("TERM x{n} := {n}; "))),
+        "more than 200 terms",
+    );
+    too_many("(0, 1) (20, 0)", &many(1001, |n| format!("({n}, 0) ")), "more than 1000 points");
+    too_many(
+        "END_RULEBLOCK",
+        &format!("{}END_RULEBLOCK", many(10_000, |_| "RULE 9 : IF t IS hot THEN fan IS off; ".to_owned())),
+        "more than 10000 rules",
+    );
+    too_many(
+        "END_FUNCTION_BLOCK",
+        &many(4, |_| {
+            format!("RULEBLOCK {} END_RULEBLOCK ", "RULE 9 : IF t IS hot THEN fan IS off; ".repeat(3000))
+        }),
+        "more than 10000 rules",
+    );
+    too_many("FUNCTION_BLOCK heat", &"a ".repeat(400_000), "more than 300000 words");
+}
+
+#[track_caller]
 fn check_heat(inputs: [f64; 2], expected_activations: [f64; 3]) {
     let mut engine = Engine::new(&fcl::read(SYSTEM).unwrap(), Options::default()).unwrap();
     engine.step(&inputs);

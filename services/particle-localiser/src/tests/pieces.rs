@@ -218,3 +218,30 @@ fn ratios_are_likelihoods() {
     check_ratios(&Ratios::of_sums(40_000, 255.0, 1.0), |points| 255.0 + points);
     check_ratios(&Ratios::of_sums(40_000, 255.0, 0.3), |points| (255.0 + points).powf(0.3));
 }
+
+#[test]
+fn a_map_is_checked_by_its_head() {
+    let folder = tempfile::tempdir().unwrap();
+    let check = |head: &str, model| {
+        std::fs::write(folder.path().join("m.pgm"), head).unwrap();
+        let yaml = folder.path().join("m.yaml");
+        let text =
+            "image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.2\n";
+        std::fs::write(&yaml, text).unwrap();
+        let map = yaml.to_string_lossy().into_owned();
+        Map::check(&Params { map, model, ..Params::default() }).map_err(|error| error.to_string())
+    };
+    // The pixels are not there, and nobody asks for them.
+    assert_eq!(check("P5 8000 8000 255\n", Model::LogProduct), Ok(()));
+    assert!(check("P5 8200 8200 255\n", Model::LogProduct).unwrap_err().contains("8200 x 8200 cells"));
+    assert!(check("P5 80 80 255\n", Model::Echo).unwrap_err().contains("needs walls that are lines"));
+    let world = |resolution_m| {
+        let file = folder.path().join("w.toml");
+        std::fs::write(&file, "name = \"w\"\n[[floor]]\nnumber = 0\nwalls = [[[0, 0], [90, 90]]]\n").unwrap();
+        let world = file.to_string_lossy().into_owned();
+        let params = Params { world, world_resolution_m: resolution_m, ..Params::default() };
+        Map::check(&params).map_err(|error| error.to_string())
+    };
+    assert_eq!(world(0.02), Ok(()));
+    assert!(world(0.002).unwrap_err().contains("world_resolution_m = 0.002"), "{:?}", world(0.002));
+}

@@ -17,6 +17,9 @@ pub(super) struct Placed {
     pub(super) column: usize,
 }
 
+/// A system of ten thousand rules has as many.
+const MOST_TOKENS: usize = 300_000;
+
 /// The longest first.
 const SYMBOLS: [&str; 11] = [":=", "..", ":", ";", "(", ")", ",", "|", "-", "+", "."];
 
@@ -35,6 +38,8 @@ struct Cursor<'a> {
     rest: &'a str,
     line: usize,
     column: usize,
+    /// Where the last comment began, and where it ended.
+    comment: Option<[usize; 4]>,
 }
 
 impl<'a> Cursor<'a> {
@@ -69,7 +74,9 @@ impl<'a> Cursor<'a> {
                 .map(|pair| pair.1)
             {
                 let end = self.rest[2..].find(close).ok_or_else(|| self.error(FclErrorKind::OpenComment))?;
+                let begun = [self.line, self.column];
                 self.take(end + 4);
+                self.comment = Some([begun[0], begun[1], self.line, self.column - 1]);
             } else {
                 return Ok(());
             }
@@ -79,7 +86,7 @@ impl<'a> Cursor<'a> {
 
 /// All tokens, the last of them `End`.
 pub(super) fn tokens(text: &str) -> Result<Vec<Placed>, FclError> {
-    let mut cursor = Cursor { rest: text, line: 1, column: 1 };
+    let mut cursor = Cursor { rest: text, line: 1, column: 1, comment: None };
     let mut all = Vec::new();
     loop {
         cursor.skip()?;
@@ -93,16 +100,22 @@ pub(super) fn tokens(text: &str) -> Result<Vec<Placed>, FclError> {
                 let length = number_length(cursor.rest);
                 if length > 0 {
                     let digits = cursor.take(length);
-                    let number = digits.parse().map_err(|_| FclErrorKind::Number(digits.to_string()));
+                    let number = digits.replace('_', "").parse();
+                    let number = number.map_err(|_| FclErrorKind::Number(digits.to_string()));
                     Token::Number(number.map_err(|kind| FclError { line, column, kind })?)
                 } else if let Some(symbol) = SYMBOLS.iter().find(|symbol| cursor.rest.starts_with(**symbol)) {
                     cursor.take(symbol.len());
                     Token::Symbol(symbol)
+                } else if cursor.rest.starts_with("*)") || cursor.rest.starts_with("*/") {
+                    return Err(cursor.error(FclErrorKind::StrayEnd { ended: cursor.comment }));
                 } else {
                     return Err(cursor.error(FclErrorKind::Character(first)));
                 }
             }
         };
+        if all.len() >= MOST_TOKENS {
+            return Err(cursor.error(FclErrorKind::TooMany { what: "words", most: MOST_TOKENS }));
+        }
         let done = token == Token::End;
         all.push(Placed { token, line, column });
         if done {
@@ -111,11 +124,18 @@ pub(super) fn tokens(text: &str) -> Result<Vec<Placed>, FclError> {
     }
 }
 
-/// The length in bytes of the number that the text begins with, or 0. In `0..1` the number ends before the dots.
+/// The length in bytes of the number that the text begins with, or 0. In `0..1` the number ends before the
+/// dots. Between digits an underscore may stand, as in IEC 61131-3.
 fn number_length(text: &str) -> usize {
     let bytes = text.as_bytes();
-    let digits =
-        |from: usize| bytes[from.min(bytes.len())..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+    let digits = |from: usize| {
+        let is_digit = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_digit);
+        let belongs = |at: &usize| {
+            is_digit(*at)
+                || (bytes.get(*at) == Some(&b'_') && *at > from && is_digit(*at - 1) && is_digit(*at + 1))
+        };
+        (from..bytes.len()).take_while(belongs).count()
+    };
     let sign = usize::from(matches!(bytes.first(), Some(b'-' | b'+')));
     let whole = digits(sign);
     let mut end = sign + whole;

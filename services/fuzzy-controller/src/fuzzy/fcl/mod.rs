@@ -1,8 +1,10 @@
 //! FCL, the Fuzzy Control Language of IEC 61131-7:2000, read and written.
 //!
-//! Beyond the standard it reads what the field's tools share: named shapes (`TRIAN`, `Gaussian`, ...), hedges, `RANGE` of
-//! inputs, `LOCK`, more norms, the accumulation in a rule block or in an output, and rules without a closing semicolon.
-//! One file holds one function block. Keywords may be written in either case, names are taken as they are written.
+//! Beyond the standard it reads what the field's tools share: named shapes (`TRIAN`, `Gaussian`, ...),
+//! hedges, `RANGE` of inputs, also beside their declaration, `LOCK`, more norms, the accumulation in a rule
+//! block or in an output, and rules without a closing semicolon. `IS any` needs no term, as in fuzzylite. One
+//! file holds one function block. Keywords may be written in either case, names are taken as they are
+//! written. What is given twice is refused: no second one wins in silence.
 
 mod lexer;
 mod parser;
@@ -64,6 +66,26 @@ pub enum FclErrorKind {
     /// A name that was given before.
     #[error("{0} is declared twice")]
     Twice(String),
+    /// Something that may be said once.
+    #[error("{0} is given twice here; keep one of the two")]
+    Again(&'static str),
+    /// The end of a comment that is over already.
+    #[error("{}", stray(.ended))]
+    StrayEnd {
+        /// Line and column of the beginning and of the end of the comment before, if there was one.
+        ended: Option<[usize; 4]>,
+    },
+    /// More of something than a controller of a robot has.
+    #[error("more than {most} {what}")]
+    TooMany {
+        /// What, in words.
+        what: &'static str,
+        /// How many there may be.
+        most: usize,
+    },
+    /// `any` of a variable without terms.
+    #[error("variable {0} has no terms, so it is nothing, not even any")]
+    AnyOfNothing(String),
     /// A keyword that is no operator, method or shape of its kind.
     #[error("{word} is no {kind}")]
     UnknownWord {
@@ -92,4 +114,13 @@ pub enum FclErrorKind {
     /// A condition with more parts or deeper brackets than is reasonable.
     #[error("the condition has more than {0} parts or levels of brackets")]
     TooLong(usize),
+}
+
+fn stray(ended: &Option<[usize; 4]>) -> String {
+    match ended {
+        Some([line, column, end_line, end_column]) => format!(
+            "a comment ends here that has not begun; comments do not nest: the one that begins in line {line}, column {column}, ended in line {end_line}, column {end_column}"
+        ),
+        None => "a comment ends here that has not begun".to_owned(),
+    }
 }

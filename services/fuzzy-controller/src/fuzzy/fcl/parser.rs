@@ -21,10 +21,19 @@ pub fn read(text: &str) -> Result<System, FclError> {
     }
 }
 
+/// A variable's name, and its range where that stands beside the declaration.
+type Declared = (String, Option<(f64, f64)>);
+
 pub(super) struct Parser {
     tokens: Vec<Placed>,
     next: usize,
 }
+
+/// More than these no controller of a robot has, and an engine of these still begins at once.
+const MOST_VARIABLES: usize = 100;
+const MOST_TERMS: usize = 200;
+const MOST_POINTS: usize = 1000;
+const MOST_RULES: usize = 10_000;
 
 /// Words that no variable or term may have as a name where a name is optional.
 const SECTIONS: [&str; 9] = [
@@ -108,20 +117,19 @@ impl Parser {
     }
 
     fn optional_number(&mut self) -> Option<f64> {
-        let sign = match self.peek() {
-            Token::Number(number) => {
-                let number = *number;
-                self.advance();
-                return Some(number);
-            }
-            Token::Symbol("-") => -1.0,
-            _ => 1.0,
-        };
         let start = self.next;
-        if matches!(self.peek(), Token::Symbol("-" | "+")) {
+        let sign = if matches!(self.peek(), Token::Symbol("-")) { -1.0 } else { 1.0 };
+        let has_sign = matches!(self.peek(), Token::Symbol("-" | "+"));
+        if has_sign {
             self.advance();
         }
-        let value = if self.eat("inf") {
+        let value = if let Token::Number(number) = *self.peek() {
+            // A sign may stand apart from its number; two signs are none.
+            (!has_sign || !number.is_sign_negative()).then(|| {
+                self.advance();
+                number
+            })
+        } else if self.eat("inf") {
             Some(f64::INFINITY)
         } else if self.eat("nan") {
             Some(f64::NAN)
@@ -147,27 +155,37 @@ impl Parser {
 
     fn section(&mut self, system: &mut System) -> Result<(), FclError> {
         if self.eat("VAR_INPUT") {
-            for name in self.declarations(system)? {
-                system.inputs.push(Input { name, ..Input::default() });
+            for (name, range) in self.declarations(system)? {
+                system.inputs.push(Input { name, range, ..Input::default() });
             }
         } else if self.eat("VAR_OUTPUT") {
-            for name in self.declarations(system)? {
-                system.outputs.push(Output { name, ..Output::default() });
+            for (name, range) in self.declarations(system)? {
+                system.outputs.push(Output { name, range, ..Output::default() });
             }
         } else if self.eat("FUZZIFY") {
             let name = self.word("the name of an input variable")?;
             let found = system.inputs.iter_mut().find(|input| input.name == name);
             let unknown = FclErrorKind::UnknownVariable { kind: "input", name };
             let input = found.ok_or_else(|| self.error_before(unknown))?;
+            if !input.terms.is_empty() {
+                return Err(self.error_before(FclErrorKind::Again("FUZZIFY of this variable")));
+            }
             self.fuzzify(input)?;
         } else if self.eat("DEFUZZIFY") {
             let name = self.word("the name of an output variable")?;
             let found = system.outputs.iter_mut().find(|output| output.name == name);
             let unknown = FclErrorKind::UnknownVariable { kind: "output", name };
             let output = found.ok_or_else(|| self.error_before(unknown))?;
+            if !output.terms.is_empty() {
+                return Err(self.error_before(FclErrorKind::Again("DEFUZZIFY of this variable")));
+            }
             self.defuzzify(output)?;
         } else if self.eat("RULEBLOCK") {
             let block = self.rule_block(system)?;
+            let rules: usize = system.blocks.iter().map(|block| block.rules.len()).sum();
+            if rules + block.rules.len() > MOST_RULES || system.blocks.len() >= MOST_RULES {
+                return Err(self.error_before(FclErrorKind::TooMany { what: "rules", most: MOST_RULES }));
+            }
             system.blocks.push(block);
         } else if self.eat("OPTIONS") {
             // The standard leaves the contents to each tool.
@@ -185,18 +203,24 @@ impl Parser {
         Ok(())
     }
 
-    /// `name : REAL;` until END_VAR; `a, b : REAL;` declares two.
-    fn declarations(&mut self, system: &System) -> Result<Vec<String>, FclError> {
-        let mut names: Vec<String> = Vec::new();
+    /// `name : REAL;` until END_VAR, each with the range that may follow it; `a, b : REAL;` declares two.
+    fn declarations(&mut self, system: &System) -> Result<Vec<Declared>, FclError> {
+        let mut all: Vec<Declared> = Vec::new();
         while !self.eat("END_VAR") {
+            let first = all.len();
             loop {
                 let name = self.word("the name of a variable or END_VAR")?;
                 let known = system.inputs.iter().map(|input| &input.name);
-                let mut known = known.chain(system.outputs.iter().map(|output| &output.name)).chain(&names);
+                let known = known.chain(system.outputs.iter().map(|output| &output.name));
+                let mut known = known.chain(all.iter().map(|(name, _)| name));
                 if known.any(|other| *other == name) {
                     return Err(self.error_before(FclErrorKind::Twice(name)));
                 }
-                names.push(name);
+                if all.len() >= MOST_VARIABLES {
+                    let (what, most) = ("variables", MOST_VARIABLES);
+                    return Err(self.error_before(FclErrorKind::TooMany { what, most }));
+                }
+                all.push((name, None));
                 if !self.eat_symbol(",") {
                     break;
                 }
@@ -204,17 +228,37 @@ impl Parser {
             self.symbol(":")?;
             self.keyword("REAL", "REAL")?;
             self.symbol(";")?;
+            // As jFuzzyLogic has it; a variable may be called so, too.
+            if self.is("RANGE")
+                && self.tokens.get(self.next + 1).is_some_and(|next| next.token == Token::Symbol(":="))
+            {
+                self.advance();
+                let range = self.range()?;
+                all[first..].iter_mut().for_each(|(_, known)| *known = Some(range));
+            }
         }
-        Ok(names)
+        Ok(all)
+    }
+
+    /// Refuses a second one of what may be said once; after its keyword.
+    fn once(&self, seen: &mut Vec<&'static str>, keyword: &'static str) -> Result<(), FclError> {
+        if seen.contains(&keyword) {
+            return Err(self.error_before(FclErrorKind::Again(keyword)));
+        }
+        seen.push(keyword);
+        Ok(())
     }
 
     fn fuzzify(&mut self, input: &mut Input) -> Result<(), FclError> {
+        let mut seen = if input.range.is_some() { vec!["RANGE"] } else { Vec::new() };
         while !self.eat("END_FUZZIFY") {
             if self.eat("TERM") {
                 self.term(&mut input.terms)?;
             } else if self.eat("RANGE") {
+                self.once(&mut seen, "RANGE")?;
                 input.range = Some(self.range()?);
             } else if self.eat("LOCK") {
+                self.once(&mut seen, "LOCK")?;
                 self.symbol(":")?;
                 self.keyword("RANGE", "RANGE")?;
                 self.symbol(";")?;
@@ -228,16 +272,21 @@ impl Parser {
 
     fn defuzzify(&mut self, output: &mut Output) -> Result<(), FclError> {
         let (mut default, mut hold) = (None, false);
+        let mut seen = if output.range.is_some() { vec!["RANGE"] } else { Vec::new() };
         while !self.eat("END_DEFUZZIFY") {
             if self.eat("TERM") {
                 self.term(&mut output.terms)?;
             } else if self.eat("RANGE") {
+                self.once(&mut seen, "RANGE")?;
                 output.range = Some(self.range()?);
             } else if self.eat("METHOD") {
+                self.once(&mut seen, "METHOD")?;
                 output.method = self.operator(&Method::KEYWORDS, "method of defuzzification")?;
             } else if self.eat("ACCU") {
+                self.once(&mut seen, "ACCU")?;
                 output.accumulation = Some(self.operator(&SNorm::KEYWORDS, "accumulation")?);
             } else if self.eat("DEFAULT") {
+                self.once(&mut seen, "DEFAULT")?;
                 self.symbol(":=")?;
                 loop {
                     if self.eat("NC") {
@@ -251,6 +300,7 @@ impl Parser {
                 }
                 self.symbol(";")?;
             } else if self.eat("LOCK") {
+                self.once(&mut seen, "LOCK")?;
                 self.symbol(":")?;
                 loop {
                     if self.eat("PREVIOUS") {
@@ -314,6 +364,11 @@ impl Parser {
         if terms.iter().any(|other| other.name == name) {
             return Err(self.error_before(FclErrorKind::Twice(name)));
         }
+        if terms.len() >= MOST_TERMS {
+            return Err(
+                self.error_before(FclErrorKind::TooMany { what: "terms of a variable", most: MOST_TERMS })
+            );
+        }
         self.symbol(":=")?;
         let start = self.next;
         let term = if matches!(self.peek(), Token::Symbol("(")) {
@@ -344,6 +399,11 @@ impl Parser {
     fn points(&mut self) -> Result<Term, FclError> {
         let mut points = Vec::new();
         while self.eat_symbol("(") {
+            if points.len() >= MOST_POINTS {
+                return Err(
+                    self.error_before(FclErrorKind::TooMany { what: "points of a term", most: MOST_POINTS })
+                );
+            }
             let x = self.number()?;
             self.symbol(",")?;
             let y = self.number()?;
@@ -355,16 +415,24 @@ impl Parser {
 
     fn rule_block(&mut self, system: &System) -> Result<RuleBlock, FclError> {
         let mut block = RuleBlock { name: self.block_name(), ..RuleBlock::default() };
+        let mut seen = Vec::new();
         while !self.eat("END_RULEBLOCK") {
             if self.eat("AND") {
+                self.once(&mut seen, "AND")?;
                 block.and = Some(self.operator(&TNorm::KEYWORDS, "AND")?);
             } else if self.eat("OR") {
+                self.once(&mut seen, "OR")?;
                 block.or = Some(self.operator(&SNorm::KEYWORDS, "OR")?);
             } else if self.eat("ACT") {
+                self.once(&mut seen, "ACT")?;
                 block.activation = Some(self.operator(&TNorm::KEYWORDS, "activation")?);
             } else if self.eat("ACCU") {
+                self.once(&mut seen, "ACCU")?;
                 block.accumulation = Some(self.operator(&SNorm::KEYWORDS, "accumulation")?);
             } else if self.eat("RULE") {
+                if block.rules.len() >= MOST_RULES {
+                    return Err(self.error_before(FclErrorKind::TooMany { what: "rules", most: MOST_RULES }));
+                }
                 block.rules.push(self.rule(system)?);
             } else {
                 return Err(self.expected("AND, OR, ACT, ACCU, RULE or END_RULEBLOCK"));

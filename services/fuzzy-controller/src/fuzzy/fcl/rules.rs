@@ -2,7 +2,7 @@
 //! NOT binds closer than AND, AND closer than OR; equals are read from the left.
 
 use super::super::norms::{Hedge, by_keyword};
-use super::super::system::{Conclusion, Condition, Rule, System};
+use super::super::system::{Conclusion, Condition, Input, Rule, System};
 use super::lexer::Token;
 use super::parser::Parser;
 use super::{FclError, FclErrorKind};
@@ -82,6 +82,13 @@ impl Parser {
         let mut hedges = Vec::new();
         let variable = &system.inputs[input];
         loop {
+            // Whatever the degree, `any` is 1: it needs no term, and the first stands for all.
+            if hedges.last() == Some(&Hedge::Any) && !self.is_term_or_hedge(variable) {
+                if variable.terms.is_empty() {
+                    return Err(self.error_before(FclErrorKind::AnyOfNothing(variable.name.clone())));
+                }
+                return Ok(Condition::Is { input, hedges, term: 0 });
+            }
             let word = self.word("a term")?;
             // A term's name goes before a hedge's.
             if let Some(term) = variable.terms.iter().position(|named| named.name == word) {
@@ -91,6 +98,11 @@ impl Parser {
             let unknown = FclErrorKind::UnknownTerm { variable: variable.name.clone(), name: word };
             hedges.push(hedge.ok_or_else(|| self.error_before(unknown))?);
         }
+    }
+
+    fn is_term_or_hedge(&self, variable: &Input) -> bool {
+        let Token::Word(word) = self.peek() else { return false };
+        variable.terms.iter().any(|named| named.name == *word) || by_keyword(&Hedge::KEYWORDS, word).is_some()
     }
 
     fn conclusion(&mut self, system: &System) -> Result<Conclusion, FclError> {

@@ -3,9 +3,10 @@
 use super::super::terms::Term;
 
 impl Term {
-    /// The term of a named shape, in either case: the names of fuzzylite (`Triangle`, `GaussianProduct`, ...), whose numbers
-    /// come in the order of [`Term`]'s documentation, and those of jFuzzyLogic (`TRIAN`, `TRAPE`, `GAUSS`,
-    /// `GBELL width slope center`, `SIGM slope inflection`). `Ok(None)` for an unknown name, `Err` for a wrong count.
+    /// The term of a named shape, in either case: the names of fuzzylite (`Triangle`, `GaussianProduct`,
+    /// ...), whose numbers come in the order of [`Term`]'s documentation, and those of jFuzzyLogic (`TRIAN`,
+    /// `TRAPE`, `GAUSS`, `GBELL width slope center`, `SIGM slope inflection`, `GAUSS2`, `DSIGM slope
+    /// inflection slope inflection`). `Ok(None)` for an unknown name, `Err` for a wrong count.
     pub fn from_keyword(name: &str, numbers: &[f64]) -> Result<Option<Self>, usize> {
         let count = Err(numbers.len());
         macro_rules! shape {
@@ -19,7 +20,7 @@ impl Term {
             "ramp" => shape!(Ramp),
             "rectangle" => shape!(Rectangle),
             "gaussian" | "gauss" => shape!(Gaussian),
-            "gaussianproduct" => shape!(GaussianProduct),
+            "gaussianproduct" | "gauss2" => shape!(GaussianProduct),
             "bell" => shape!(Bell),
             "sigmoid" => shape!(Sigmoid),
             "sigmoiddifference" => shape!(SigmoidDifference),
@@ -37,6 +38,12 @@ impl Term {
             },
             "sigm" => match *numbers {
                 [slope, inflection] => Ok(Some(Self::Sigmoid([inflection, slope]))),
+                _ => count,
+            },
+            "dsigm" => match *numbers {
+                [rising, left, falling, right] => {
+                    Ok(Some(Self::SigmoidDifference([left, rising, falling, right])))
+                }
                 _ => count,
             },
             "constant" => match *numbers {
