@@ -257,7 +257,7 @@ fn number(bytes: &mut Vec<u8>, chance: &mut Pcg64Mcg) {
         let digits = vec![b'9'; log_uniform(10_000, chance)];
         insert(bytes, digit..digit, &digits);
     } else {
-        let with: &str = pick(NUMBERS, chance);
+        let with = *pick(NUMBERS, chance);
         insert(bytes, begin..end, with.as_bytes());
     }
 }
