@@ -1,5 +1,7 @@
 //! The launcher: checks, starts, watches, swaps and stops the services of a robot.
 
+#![warn(clippy::print_stdout, clippy::print_stderr)] // What is printed goes through `console`, which nobody can hold up.
+
 mod chaos;
 mod cli;
 mod commands;

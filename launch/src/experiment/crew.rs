@@ -2,8 +2,12 @@
 
 use super::plan::Run;
 use super::store::{Outcome, Record};
+use crate::console::warn;
 use board::clock;
 use std::collections::{BTreeMap, VecDeque};
+use std::fs::File;
+use std::io::Read as _;
+use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt as _;
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -56,7 +60,12 @@ impl Crew {
         std::thread::scope(|scope| {
             for (place, &processor) in self.processors.iter().enumerate() {
                 let (sender, queue, stop) = (sender.clone(), &queue, &stop);
-                scope.spawn(move || self.place(place, processor, queue, stop, &sender));
+                let work = move || self.place(place, processor, queue, stop, &sender);
+                if let Err(error) = std::thread::Builder::new().spawn_scoped(scope, work) {
+                    warn(&format!("place {place} is not used: no thread can be started: {error}"));
+                    // Those that were started do the rest; without any there is nobody to wait for.
+                    break;
+                }
             }
             drop(sender);
             let mut outcome = Ok(());
@@ -153,19 +162,27 @@ fn run_child(command: &mut Command, stop: &AtomicBool) -> Ended {
             return Ended { status: None, stdout: String::new(), stderr: error.to_string() };
         }
     };
-    let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
+    let pipes = [child.stdout.take().map(OwnedFd::from), child.stderr.take().map(OwnedFd::from)];
     std::thread::scope(|scope| {
-        let stdout = scope.spawn(|| text_of(stdout));
-        let stderr = scope.spawn(|| text_of(stderr));
+        let begin = |pipe| std::thread::Builder::new().spawn_scoped(scope, || text_of(pipe));
+        let readers = pipes.map(begin);
+        if readers.iter().any(Result::is_err) {
+            // It would wait for ever for somebody who reads what it says.
+            let _ = child.kill();
+        }
         let status = wait_for(&mut child, stop);
-        Ended { status, stdout: stdout.join().unwrap_or_default(), stderr: stderr.join().unwrap_or_default() }
+        let [stdout, stderr] = readers.map(|reader| match reader {
+            Ok(reader) => reader.join().unwrap_or_default(),
+            Err(error) => format!("no thread can be started: {error}"),
+        });
+        Ended { status, stdout, stderr }
     })
 }
 
-fn text_of(pipe: Option<impl std::io::Read>) -> String {
+fn text_of(pipe: Option<OwnedFd>) -> String {
     let mut bytes = Vec::new();
     // What was read before an error is still worth a look.
-    let _ = pipe.map(|mut pipe| pipe.read_to_end(&mut bytes));
+    let _ = pipe.map(|pipe| File::from(pipe).read_to_end(&mut bytes));
     String::from_utf8_lossy(&bytes).into_owned()
 }
 

@@ -37,21 +37,27 @@ pub(crate) fn build(packages: &[String]) -> Result<HashMap<String, PathBuf>, Bui
     command.args(["build", "--release", "--message-format", "json-render-diagnostics"]);
     command.args(packages.iter().flat_map(|package| ["--package", package]));
     command.current_dir(folder.join("..")).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = command.spawn().map_err(|cause| BuildError::NoCargo { cargo, cause })?;
+    let no_cargo = |cause| BuildError::NoCargo { cargo: cargo.clone(), cause };
+    let mut child = command.spawn().map_err(no_cargo)?;
     let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
     let progress = Progress::new(packages);
     let complaints = std::thread::scope(|scope| {
-        let complaints = scope.spawn(|| {
+        let read = || {
             let lines =
                 stderr.into_iter().flat_map(|pipe| BufReader::new(pipe).lines()).map_while(Result::ok);
             lines.filter(|line| !progress.takes(line)).collect::<Vec<_>>()
-        });
+        };
+        // Without it cargo's words would hold up cargo.
+        let complaints = std::thread::Builder::new().spawn_scoped(scope, read).inspect_err(|_| {
+            let _ = child.kill();
+        })?;
         for line in stdout.into_iter().flat_map(|pipe| BufReader::new(pipe).lines()).map_while(Result::ok) {
             built.extend(binary_in(&line));
         }
-        complaints.join().unwrap_or_default()
+        Ok(complaints.join().unwrap_or_default())
     });
     progress.end();
+    let complaints = complaints.map_err(no_cargo)?;
     if child.wait().is_ok_and(|status| status.success()) {
         return Ok(built);
     }

@@ -238,9 +238,15 @@ impl View<'_> {
                 let (sender, receiver) = mpsc::channel();
                 let place = self.place.clone();
                 let text = format!("ordering {what} ..");
-                std::thread::spawn(move || _ = sender.send(order::order(place, &what)));
-                self.request = Some(receiver);
-                self.choice.message = Some(Message { text, is_trouble: false });
+                let ask = move || _ = sender.send(order::order(place, &what));
+                let thread = std::thread::Builder::new().name("order".to_owned()).spawn(ask);
+                self.request = thread.is_ok().then_some(receiver);
+                self.choice.message = Some(match thread {
+                    Ok(_) => Message { text, is_trouble: false },
+                    Err(error) => {
+                        Message { text: format!("the order was not given: {error}"), is_trouble: true }
+                    }
+                });
                 return false;
             }
             Wish::Stop => (Request::Stop { fast: false }, "stopping the robot".to_owned()),

@@ -234,7 +234,9 @@ impl Navigator {
         let reports: Vec<OrderReport> = by_default.into_iter().chain(taken).collect();
         let refused = reports.iter().rev().find(|report| report.state == OrderStateName::Refused);
         if let Some(refused) = refused {
-            self.notice = Some((now, format!("refused: {}", refused.remark)));
+            // Here is less space than in the report, whose second half is advice.
+            let why = refused.remark.as_str().split(';').next().unwrap_or_default();
+            self.notice = Some((now, format!("refused: {why}")));
         }
         reports
     }

@@ -88,7 +88,7 @@ fn impossible_orders_are_refused_and_do_not_stop_the_queue() {
     world.run_until(Delivered, 200.0);
     let mut stairs = World::new(params());
     stairs.navigator = Navigator::with_building(params(), Building { lift: None, ..building() }).unwrap();
-    check_refused(&mut stairs, "302", "refused: no elevator to room 302");
+    check_refused(&mut stairs, "302", "refused: no elevator goes to room 302");
     let mut nowhere = World::new(params());
     nowhere.navigator = Navigator::with_building(params(), Building { home: None, ..building() }).unwrap();
     check_refused(&mut nowhere, "207", "refused: the tea room is not known");
