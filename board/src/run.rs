@@ -210,6 +210,12 @@ fn serve(
     let mut node = Node::joined(&role, joined, is_shadow);
     let step = make(&mut node, parameters(arguments)?)?;
     let Some(mut joined) = node.joined.take() else { return Ok(()) };
+    tracing::info!(
+        "{} {} begins as `{role}`{}",
+        about.name,
+        about.version,
+        if is_shadow { ", mute" } else { "" }
+    );
     let name = if is_shadow { host::shadow_role(&role) } else { role };
     let health = open_health(&mut joined, &name)?;
     let mut service = Service {

@@ -4,7 +4,7 @@ use crate::graph::Checked;
 use crate::lockstep::{Outcome, Pace};
 use crate::notes;
 use board::JoinError;
-use board::manifest::Manifest;
+use board::manifest::{Manifest, Topic};
 use board::tap::{OUTSIDE_ROUND, Tap, TapReader};
 use messages::{RunState, RunSummary, Time, View};
 use recording::{Digest, Digester, Envelope, Recorder};
@@ -92,6 +92,25 @@ impl Observer {
         Ok(())
     }
 
+    /// In host time: reads topics that were added to the board since, as a swap or a shadow does. They are recorded, and are no part of the digest.
+    ///
+    /// # Errors
+    /// When the board cannot be read, or the recording cannot be written.
+    pub(crate) fn follow(&mut self) -> Result<(), ObserverError> {
+        let added = self.tap.refresh()?;
+        let added: Vec<recording::Topic> =
+            self.tap.manifest().topics[added].iter().filter(|topic| is_of_a_run(topic)).map(entry).collect();
+        for topic in added {
+            if let Some(recorder) = &mut self.recorder {
+                recorder.add_topic(&topic)?;
+            }
+            let reader = self.tap.reader(&topic.name)?;
+            self.readers.push(Watched { topic: topic.name, reader });
+            self.outside.push(false);
+        }
+        Ok(())
+    }
+
     /// In host time: takes in what has come, and sleeps until more comes, at most for `rest`.
     ///
     /// # Errors
@@ -149,18 +168,25 @@ impl Observer {
 
 /// The topics of a run as a recording lists them.
 fn of_a_run(manifest: &Manifest, notes: BTreeMap<String, String>) -> recording::Manifest {
-    let topics = manifest.topics.iter().filter(|topic| !topic.name.starts_with("health/"));
+    let topics = manifest.topics.iter().filter(|topic| is_of_a_run(topic));
     recording::Manifest {
         graph: manifest.graph.clone(),
         seed: manifest.seed,
-        topics: topics
-            .map(|topic| recording::Topic {
-                name: topic.name.clone(),
-                publisher: topic.publisher.clone(),
-                depth: topic.depth,
-                message: topic.message.clone(),
-            })
-            .collect(),
+        topics: topics.map(entry).collect(),
         notes,
+    }
+}
+
+/// The health of the services speaks of the machine.
+fn is_of_a_run(topic: &Topic) -> bool {
+    !topic.name.starts_with("health/")
+}
+
+fn entry(topic: &Topic) -> recording::Topic {
+    recording::Topic {
+        name: topic.name.clone(),
+        publisher: topic.publisher.clone(),
+        depth: topic.depth,
+        message: topic.message.clone(),
     }
 }

@@ -78,6 +78,7 @@ fn record(place: Place, graph: &Checked, file: PathBuf, ending: &AtomicBool) -> 
     let mut observer = Observer::new(Tap::join(place, "record")?, graph, &pace)?;
     while !ending.load(Ordering::Acquire) {
         observer.look_and_rest(LOOK)?;
+        observer.follow()?;
         observer.tick(clock::monotonic())?;
     }
     observer.look()?;

@@ -80,6 +80,23 @@ fn a_shadow_says_nothing_to_the_robot_and_is_compared() {
 }
 
 #[test]
+fn a_recording_follows_topics_that_are_added() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("run.mcap");
+    let graph = Graph::load("coffee").with(&["--record", &file.to_string_lossy()]).start();
+    graph.wait_for("wheels/applied", |applied| applied["reason"] == "Driving", Duration::from_secs(60));
+    launch(
+        &graph,
+        &["swap", "controller=window-controller", "--shadow", "--for", "1", "--json", "--no-build"],
+    );
+    graph.stop();
+    let recording = recording::Recording::open(&file).unwrap();
+    assert!(recording.is_complete());
+    let shadows = recording.as_recorded(|topic| topic.name == "shadow/wheels/desired").count();
+    assert!(shadows > 5, "{shadows} messages of the shadow");
+}
+
+#[test]
 fn a_newcomer_that_cannot_play_the_role_is_refused_and_the_old_one_goes_on() {
     let graph = Graph::load("coffee").set("navigator.default_order", "").start();
     let planner = graph.pid("planner");

@@ -1,7 +1,9 @@
 //! The process around `base_driver`.
 use base_driver::{BaseDevice, BaseDriver, Device, Inputs, Params, Room, Snapshot};
-use board::{Kept, Latest, Publisher};
-use messages::{AppliedWheels, Clearance, MotionCommand, Odometry, Time, WheelSpeeds, WorldTruth};
+use board::{Kept, Latest, News, Publisher};
+use messages::{
+    AppliedWheels, Clearance, DriveReason, MotionCommand, Odometry, Time, WheelSpeeds, WorldTruth,
+};
 use std::process::ExitCode;
 
 /// What has to come to rest, whichever way the process leaves.
@@ -11,6 +13,7 @@ struct Base {
     applied: Publisher<AppliedWheels>,
     kept: Kept<Option<Snapshot>>,
     has_stepped: bool,
+    news: News<DriveReason>,
 }
 
 impl Base {
@@ -25,6 +28,9 @@ impl Base {
         let outputs = self.driver.step(now, inputs);
         // A controller that does not answer shows in its encoders with the next step.
         let _ = self.device.drive(outputs.applied.left_mps, outputs.applied.right_mps);
+        if self.news.is_news(now, outputs.applied.reason) {
+            tracing::info!("{:?}", outputs.applied.reason);
+        }
         self.applied.publish(&outputs.applied);
         if let Some(odometry) = outputs.odometry {
             ports.odometry.publish(&odometry);
@@ -75,7 +81,7 @@ fn main() -> ExitCode {
         if let Some(snapshot) = kept.restore().flatten() {
             driver.restore(&snapshot);
         }
-        let mut base = Base { driver, device, applied, kept, has_stepped: false };
+        let mut base = Base { driver, device, applied, kept, has_stepped: false, news: News::new() };
         Ok(move |now| base.step(now, &mut ports))
     })
 }

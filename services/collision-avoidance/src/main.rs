@@ -1,4 +1,5 @@
 //! The process around `collision_avoidance`.
+use board::News;
 use collision_avoidance::{CollisionAvoidance, Inputs, Params, Sensor, Snapshot};
 use messages::{Clearance, Odometry, PoseEstimate, RangeScan, TofRanges};
 use std::process::ExitCode;
@@ -25,6 +26,7 @@ fn main() -> ExitCode {
         if let Some(snapshot) = kept.restore() {
             guard.restore(&snapshot);
         }
+        let mut news = News::new();
         Ok(move |now| {
             let inputs = Inputs {
                 ranges: ranges.as_mut().and_then(|ranges| ranges.read()),
@@ -33,6 +35,17 @@ fn main() -> ExitCode {
                 pose: pose.read(),
             };
             let outputs = guard.step(now, inputs);
+            let said = &outputs.clearance;
+            if news.is_news(now, (said.signal, said.reason)) {
+                tracing::info!(
+                    front_m = said.front_m,
+                    right_m = said.right_m,
+                    left_m = said.left_m,
+                    "{:?}: {:?}",
+                    said.signal,
+                    said.reason
+                );
+            }
             clearance.publish_with(&outputs.clearance, outputs.near);
             kept.save_now_and_then(now, || guard.snapshot());
         })

@@ -1,4 +1,5 @@
 //! The process around `executive`.
+use board::News;
 use executive::{Executive, Inputs, Params};
 use messages::{
     JourneyStatus, MotionCommand, MotionReport, ParticleCloud, Path, PlanRequest, PoseEstimate, RangeScan,
@@ -22,6 +23,7 @@ fn main() -> ExitCode {
         node.wake_on(&path);
         node.every(params.period());
         let mut executive = Executive::new(params, node.seed())?;
+        let mut news = News::new();
         Ok(move |now| {
             let inputs = Inputs {
                 raw: raw.read(),
@@ -35,7 +37,18 @@ fn main() -> ExitCode {
             sonar.publish(&outputs.sonar);
             motion.publish(&outputs.motion);
             request.publish(&outputs.request);
-            status.publish(&outputs.status);
+            let said = &outputs.status;
+            if news.is_news(now, (said.stage, said.retreats, said.plans, said.remark)) {
+                tracing::info!(
+                    "{:?}, {} places alike, {} paths, {} retreats {}",
+                    said.stage,
+                    said.places,
+                    said.plans,
+                    said.retreats,
+                    said.remark
+                );
+            }
+            status.publish(said);
         })
     })
 }

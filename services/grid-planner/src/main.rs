@@ -1,4 +1,5 @@
 //! The process around `grid_planner`.
+use board::News;
 use grid_planner::{GridPlanner, Inputs, Params};
 use messages::{Path, PlanRequest, PoseEstimate, TofRanges};
 use std::process::ExitCode;
@@ -14,9 +15,19 @@ fn main() -> ExitCode {
         GridPlanner::check(&params)?;
         node.declared()?;
         let mut planner = GridPlanner::new(params)?;
+        let mut news = News::new();
         Ok(move |now| {
             let inputs = Inputs { request: request.read(), pose: pose.read(), ranges: ranges.read() };
             if let Some((header, waypoints)) = planner.step(now, inputs).path {
+                if news.is_news(now, (header.request_id, header.revision, header.state)) {
+                    tracing::info!(
+                        length_m = header.length_m,
+                        "path {}.{}: {:?}",
+                        header.request_id,
+                        header.revision,
+                        header.state
+                    );
+                }
                 path.publish_with(&header, waypoints);
             }
         })

@@ -1,4 +1,5 @@
 //! The process around `navigator`. What a delivery needs to go on is kept before anything is said, so that a successor goes on with it.
+use board::News;
 use messages::{
     AppliedWheels, Clearance, DoorSighting, DriveCommand, ElevatorCall, ElevatorState, MissionStatus, Order,
     OrderReport, Path, PlanRequest, PoseEstimate, Stamped, Time,
@@ -28,6 +29,7 @@ fn main() -> ExitCode {
         if let Some(snapshot) = kept.restore() {
             navigator.restore(&snapshot);
         }
+        let mut news = News::new();
         Ok(move |now| {
             let mut arrived: Vec<(Time, u64, Order)> = Vec::new();
             while let Some(order) = orders.next() {
@@ -53,8 +55,22 @@ fn main() -> ExitCode {
                 },
             );
             kept.save(&navigator.snapshot());
-            outputs.reports.iter().for_each(|message| reports.publish(message));
-            outputs.status.inspect(|message| status.publish(message));
+            for report in &outputs.reports {
+                tracing::info!(
+                    "order {} to `{}`: {:?} {}",
+                    report.order_id,
+                    report.room,
+                    report.state,
+                    report.remark
+                );
+                reports.publish(report);
+            }
+            if let Some(message) = &outputs.status {
+                if news.is_news(now, (message.status, message.remark)) {
+                    tracing::info!("{:?} {}", message.status, message.remark);
+                }
+                status.publish(message);
+            }
             outputs.request.inspect(|message| request.publish(message));
             outputs.call.inspect(|message| call.publish(message));
             command.publish(&outputs.command);

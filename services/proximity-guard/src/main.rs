@@ -1,4 +1,5 @@
 //! The process around `proximity_guard`.
+use board::News;
 use messages::{Clearance, Odometry, RangeScan, SonarAhead};
 use proximity_guard::{Inputs, Params, ProximityGuard};
 use std::process::ExitCode;
@@ -12,9 +13,21 @@ fn main() -> ExitCode {
         node.wake_on(&ahead);
         node.every(params.period());
         let mut guard = ProximityGuard::new(params)?;
+        let mut news = News::new();
         Ok(move |now| {
             let outputs =
                 guard.step(now, Inputs { ahead: ahead.read(), scan: scan.read(), odometry: odometry.read() });
+            let said = &outputs.clearance;
+            if news.is_news(now, (said.signal, said.reason)) {
+                tracing::info!(
+                    front_m = said.front_m,
+                    right_m = said.right_m,
+                    left_m = said.left_m,
+                    "{:?}: {:?}",
+                    said.signal,
+                    said.reason
+                );
+            }
             clearance.publish(&outputs.clearance);
         })
     })

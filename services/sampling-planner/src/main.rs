@@ -1,4 +1,5 @@
 //! The process around `sampling_planner`.
+use board::News;
 use messages::{Path, PlanRequest, PoseEstimate, TofRanges};
 use sampling_planner::{Inputs, Params, SamplingPlanner};
 use std::process::ExitCode;
@@ -12,9 +13,19 @@ fn main() -> ExitCode {
         node.wake_on(&request);
         node.every(params.period());
         let mut planner = SamplingPlanner::new(params, node.seed())?;
+        let mut news = News::new();
         Ok(move |now| {
             let inputs = Inputs { request: request.read(), pose: pose.read(), ranges: ranges.read() };
             if let Some((header, waypoints)) = planner.step(now, inputs).path {
+                if news.is_news(now, (header.request_id, header.revision, header.state)) {
+                    tracing::info!(
+                        length_m = header.length_m,
+                        "path {}.{}: {:?}",
+                        header.request_id,
+                        header.revision,
+                        header.state
+                    );
+                }
                 path.publish_with(&header, waypoints);
             }
         })
