@@ -17,6 +17,7 @@ mod lockstep;
 mod monitor;
 mod new;
 mod notes;
+mod numbers;
 mod observer;
 mod order;
 mod plain;
