@@ -29,6 +29,7 @@ mod runs;
 mod shadow;
 mod signals;
 mod standstill;
+mod statistics;
 mod steering;
 mod summary;
 mod supervise;
