@@ -457,8 +457,8 @@ pub(crate) struct ExperimentArgs {
     /// Do all runs again
     #[arg(long, conflicts_with = "resume")]
     pub(crate) fresh: bool,
-    /// Only this variant of the file; any number of times. The first of those that are left is what the others
-    /// are compared with
+    /// Only this variant of the file; any number of times. The first of those that are left is what the
+    /// others are compared with
     #[arg(long, value_name = "VARIANT")]
     pub(crate) only: Vec<String>,
     /// Other seeds than the file's, for every variant: from the first to the last (1..20), or single ones

@@ -290,8 +290,8 @@ fn closing_words(plan: &Plan, store: &Store, out: &Path) -> String {
     lines.join("\n")
 }
 
-/// How long the runs took, each with all its processes on one processor. Not in the tables: it is not the same the
-/// next time.
+/// How long the runs took, each with all its processes on one processor. Not in the tables: it is not the
+/// same the next time.
 fn computation(records: &[Record]) -> String {
     let run = records.iter().filter(|record| record.outcome != Outcome::Error);
     let took = sorted(&run.map(|record| record.wall_s).collect::<Vec<_>>());

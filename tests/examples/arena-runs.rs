@@ -94,9 +94,9 @@ fn sheet(arena: u32) -> Sheet {
     let plan = Plan::new("", low - margin, high + margin, [760.0, 760.0])
         .with(Layer::lines("walls", BLACK, 2.5, vec![corners]))
         .with(Layer::poses("where it might have been, after a scan", GREY, 16.0, poses(possible)))
-        .with(Layer::poses("where it knew that it was", ORANGE, 16.0, poses(certain)))
         .with(Layer::lines("driven to tell places apart", GREEN, 3.0, localising))
         .with(Layer::lines("driven towards the target", BLUE, 3.0, driving))
+        .with(Layer::poses("where it knew that it was", ORANGE, 16.0, poses(certain)))
         .with(Layer::places("target", VERMILLION, Glyph::Ring(8.0), target.into_iter().collect()))
         .with(Layer::names(start.into_iter().collect()));
     let words = format!("1 run from the map's preset start to its target, seed {SEED}: {}.", run.verdict);

@@ -48,7 +48,8 @@ fn passed_on(lines: impl Iterator<Item = String>, to: &mut impl Write) -> Vec<St
     let mut is_told = false;
     let take = |line: String| {
         let is_work = ["Compiling", "Blocking", "Downloading"].iter().any(|word| line.contains(word));
-        // Not by the macro, whose words are kept back until a test has failed. Who does not listen is not told.
+        // Not by the macro, whose words are kept back until a test has failed. Who does not listen is not
+        // told.
         if is_work && !std::mem::replace(&mut is_told, true) {
             let _ = writeln!(to, "building the services (release) ..");
         }

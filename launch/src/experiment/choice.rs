@@ -68,8 +68,8 @@ pub(super) fn seeds(text: &str) -> Result<Vec<u64>, PlanError> {
     Ok(seeds)
 }
 
-/// `role.key=a,b,c`, and `role=one-binary,another`; or one value, commas and all. Values are TOML; what is none
-/// is a text.
+/// `role.key=a,b,c`, and `role=one-binary,another`; or one value, commas and all. Values are TOML; what is
+/// none is a text.
 pub(super) fn swept(text: &str, several: bool) -> Result<(String, Vec<Value>), PlanError> {
     let wrong = || PlanError::Sweep { given: text.to_owned() };
     let (key, values) = text.split_once('=').ok_or_else(wrong)?;

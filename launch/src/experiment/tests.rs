@@ -475,7 +475,8 @@ fn check_drawn(figure: &str, marks: &[&str], counts: [usize; 2]) {
     let words = ["old", "new", "n = 6", "12 of 12 runs"].into_iter().chain(legend);
     let words: Vec<&str> = words.chain(marks.iter().copied()).collect();
     assert_eq!(pictures::lacks(&svg, &words), Vec::<String>::new(), "{svg}");
-    // A dot a run that passed and one in the legend; each cross is two lines of the colour of what went wrong.
+    // A dot a run that passed and one in the legend; each cross is two lines of the colour of what
+    // went wrong.
     let crosses = svg.matches("#D55E00").count() / 2;
     assert_eq!([svg.matches("<circle").count(), crosses], counts, "{svg}");
 }

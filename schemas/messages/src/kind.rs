@@ -207,8 +207,8 @@ impl Description {
         (self.fingerprint() != other.fingerprint()).then(|| "the named states differ".to_owned())
     }
 
-    /// The unit of the field at a path as tools write it (`anchors[3].range_m`, `elements[].x_m`, the index left out or
-    /// not); empty for a pure number, and when there is no such field.
+    /// The unit of the field at a path as tools write it (`anchors[3].range_m`, `elements[].x_m`, the
+    /// index left out or not); empty for a pure number, and when there is no such field.
     pub fn unit_at(&self, path: &str) -> &str {
         let mut steps = path.split('.').map(|step| step.split('[').next().unwrap_or_default()).peekable();
         let mut record = self;

@@ -1,14 +1,16 @@
 //! A piece of ground from above, to scale.
 
-use crate::canvas::{Canvas, PictureError, px, text, text_at, upright};
+use crate::canvas::{Canvas, PictureError, letters_width_px, px, text, text_at, upright};
 use crate::colours::{BLACK, GREY};
 use crate::legend::{Entry, Glyph, Legend};
 use crate::ticks::{tick_label, ticks};
 use geometry::{Point2, Pose2};
-use plotters::prelude::{Circle, Color, PathElement, Polygon, RGBColor, Rectangle, Text};
+use plotters::prelude::{Circle, Color, PathElement, Polygon, RGBColor, Rectangle, Text, WHITE};
 use plotters::style::text_anchor::{HPos, VPos};
 
 const LETTERS_PX: f64 = 12.0;
+/// Names on the plan.
+const NAMES_PX: f64 = 13.0;
 /// Room for the numbers and the name of the axis at the left.
 const LEFT_PX: f64 = 58.0;
 const RIGHT_PX: f64 = 14.0;
@@ -319,8 +321,13 @@ fn draw_layer(canvas: &Canvas<'_>, map: &Map, layer: &Layer) -> Result<(), Pictu
         }),
         Shape::Names(names) => names.iter().try_for_each(|(place, name)| {
             let [x, y] = map.px(*place);
-            let style = text(13.0, HPos::Left, VPos::Bottom);
-            canvas.draw(&Text::new(name.clone(), (px(x + 8.0), px(y - 4.0)), style))
+            let (left, bottom) = (x + 8.0, y - 4.0);
+            // Paper behind it, so that it can be read over lines.
+            let right = left + letters_width_px(name, NAMES_PX);
+            let paper = [(px(left - 2.0), px(bottom - NAMES_PX)), (px(right + 2.0), px(bottom + 2.0))];
+            canvas.draw(&Rectangle::new(paper, WHITE.mix(0.75).filled()))?;
+            let style = text(NAMES_PX, HPos::Left, VPos::Bottom);
+            canvas.draw(&Text::new(name.clone(), (px(left), px(bottom)), style))
         }),
     };
     drawn.map_err(PictureError::of)
