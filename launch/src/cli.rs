@@ -135,11 +135,15 @@ Examples:
 
 const EXPERIMENT_HELP: &str = "\
 Every finished run is in runs.csv at once: after an interruption the same command does the rest. Runs whose binaries, worlds or
-parameters have changed since are done again.
+parameters have changed since are done again; runs of other seeds and variants stay in it. Variants are compared with the
+first one run by run: the same situation, the same seed. A variant that needs files which are not there is left out, with a word.
 Exit code: 0 all runs were done and every expectation of the file holds, 1 otherwise.
 
 Examples:
   launch experiment coffee
+  launch experiment coffee --dry-run --seeds 1..3
+  launch experiment coffee --only \"fuzzy rules\" --only \"dynamic window\" --by default_order
+  launch experiment coffee --only \"fuzzy rules\" --sweep planner.clearance_m=0.2,0.3,0.4 --out /tmp/clearance
   launch experiment ./radii.toml --jobs 1 --out /tmp/radii";
 
 const CHAOS_HELP: &str = "\
@@ -455,7 +459,28 @@ pub(crate) struct ExperimentArgs {
     /// Do all runs again
     #[arg(long, conflicts_with = "resume")]
     pub(crate) fresh: bool,
-    /// Check every variant and list them, without a run
+    /// Only this variant of the file; any number of times. The first of those that are left is what the
+    /// others are compared with
+    #[arg(long, value_name = "VARIANT")]
+    pub(crate) only: Vec<String>,
+    /// Other seeds than the file's, for every variant: from the first to the last (1..20), or single ones
+    /// (3,5,8)
+    #[arg(long, value_name = "SEEDS")]
+    pub(crate) seeds: Option<String>,
+    /// Make several of each variant, one for each value of a parameter (or binary of a role); any number of
+    /// times
+    #[arg(long, value_name = "ROLE.KEY=A,B,..")]
+    pub(crate) sweep: Vec<String>,
+    /// Give a parameter another value in all variants; any number of times
+    #[arg(long, value_name = "ROLE.KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Show passes and figures for each value of this axis of the situations, such as `default_order`
+    #[arg(long, value_name = "AXIS")]
+    pub(crate) by: Option<String>,
+    /// Show all tables, and not only what differs most clearly
+    #[arg(long)]
+    pub(crate) all: bool,
+    /// Check every variant, list them, and say how long they will take; without a run
     #[arg(long)]
     pub(crate) dry_run: bool,
     /// In a source checkout: use what is built already

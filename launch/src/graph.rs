@@ -25,6 +25,7 @@ mod tree;
 pub(crate) use check::{Checked, CheckedService, CheckedTopic, Publisher};
 pub(crate) use faults::{Fault, FaultKind};
 pub(crate) use file::{Overrides, shown};
-pub(crate) use find::checkout;
+pub(crate) use find::{checkout, find, names_in};
 pub(crate) use report::{Request, check_command, graph_command, prepare, prepare_recorded};
 pub(crate) use settings::{Priority, ViewSettings};
+pub(crate) use suggest::hint;

@@ -1,4 +1,10 @@
-//! `launch rerun`: a recorded run again, whole or service by service on the recorded inputs, and whether it comes out the same.
+//! `launch rerun`: a recorded run again, whole or service by service on the recorded inputs, and whether it
+//! comes out the same.
+//!
+//! Of a whole run the judge's last word on both comes first ([`judge`]), then the topics ([`text`]).
+
+mod judge;
+mod text;
 
 use crate::cli::RerunArgs;
 use crate::console::Console;
@@ -10,17 +16,22 @@ use crate::notes;
 use crate::prompter::Part;
 use crate::signals::Signals;
 use crate::up::Options;
+use board::terminal::harmless;
+use judge::{Judged, LastWord};
 use messages::Time;
 use recording::{Difference, Digest, Recording, TopicComparison, compare_topics};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Duration;
 
 type Failure = Box<dyn std::error::Error>;
 
 /// The exit code of what could not be run.
 const NOT_RUN: u8 = 2;
+/// With a change a robot may need longer than it did: so many times as long, and a minute.
+const LONGER: u64 = 3;
 
 /// What came of it.
 #[derive(Debug, Serialize)]
@@ -34,6 +45,8 @@ struct Report {
     services: Vec<String>,
     logical_s: f64,
     wall_s: f64,
+    /// What the judge said of both, when the whole graph ran and has a judge.
+    judge: Option<Judged>,
     /// Of the whole run, when the whole graph ran.
     digests: Option<Digests>,
     /// Where the two first differ in logical time.
@@ -56,7 +69,8 @@ pub(crate) fn command(args: &RerunArgs) -> ExitCode {
             if args.json {
                 say_line(&serde_json::to_string_pretty(&report).unwrap_or_default());
             } else {
-                say(&text(&report));
+                // The judge's words came from a service.
+                say(&text::of(&report).lines().map(|line| harmless(line) + "\n").collect::<String>());
             }
             if report.same { ExitCode::SUCCESS } else { ExitCode::FAILURE }
         }
@@ -116,6 +130,13 @@ fn rerun(args: &RerunArgs) -> Result<Report, Failure> {
         None => last_stamp(&recording)?,
     };
     let mut pace = Pace { until: Some(until), last: Some(until), ..Pace::default() };
+    let recorded = LastWord::of(&recording, whole.finish.as_deref())?;
+    let is_changed = !args.with.is_empty() || !args.set.is_empty() || args.graph.is_some();
+    if args.closed && is_changed && recorded.as_ref().is_some_and(LastWord::is_decided) {
+        // Then the judge ended the run, and ends this one, be it later.
+        let longer = Duration::from_nanos(until.as_nanos().saturating_mul(LONGER)) + Duration::from_secs(60);
+        (pace.until, pace.last) = (Some(Time::ZERO.after(longer)), None);
+    }
     pace.faults = notes::ordered(manifest);
     pace.faults.retain(|fault| roles.contains(&fault.role));
     let graph = if driven.is_empty() {
@@ -134,7 +155,7 @@ fn rerun(args: &RerunArgs) -> Result<Report, Failure> {
         }
         graph
     };
-    run_and_compare(args, &recording, &graph, pace, !driven.is_empty(), remarks)
+    run_and_compare(args, &recording, recorded, &graph, pace, !driven.is_empty(), remarks)
 }
 
 /// The services that run alone; none when the whole graph runs.
@@ -213,6 +234,7 @@ fn last_stamp(recording: &Recording) -> Result<Time, Failure> {
 fn run_and_compare(
     args: &RerunArgs,
     recording: &Recording,
+    recorded: Option<LastWord>,
     graph: &Checked,
     mut pace: Pace,
     is_open: bool,
@@ -257,7 +279,21 @@ fn run_and_compare(
     let same = same.unwrap_or_else(|| topics.iter().all(is_same));
     let first = topics.iter().filter(|topic| !is_same(topic)).filter_map(|topic| topic.first.as_ref());
     let difference = first.min_by_key(|found| (found.stamp_ns, found.round)).cloned();
+    let judge = match is_open {
+        false => Judged::new(recorded, LastWord::of(&rerun, graph.finish.as_deref())?),
+        true => None,
+    };
     let mut remarks = remarks;
+    if !is_open && judge.is_none() {
+        remarks
+            .push("no topic of this graph is that of a judge: what came of the run is not known".to_owned());
+    }
+    if pace.last.is_none() && pace.until.is_some_and(|until| end >= until) {
+        let end_s = end.as_secs_f64();
+        remarks.push(format!(
+            "the rerun was broken off after {end_s:.0} s, long after the recorded run had ended"
+        ));
+    }
     if !is_whole {
         remarks.push("the recording was cut: it is compared up to its last whole chunk".to_owned());
     }
@@ -267,6 +303,7 @@ fn run_and_compare(
         services,
         logical_s: end.as_secs_f64(),
         wall_s,
+        judge,
         digests,
         difference,
         topics,
@@ -320,108 +357,5 @@ impl Drop for Kept {
         if !self.is_wanted {
             let _ = std::fs::remove_file(&self.file);
         }
-    }
-}
-
-fn text(report: &Report) -> String {
-    let mut text = String::new();
-    let mut line = |words: String| text += &(words + "\n");
-    for remark in &report.remarks {
-        line(format!("note: {remark}"));
-    }
-    let who = match report.closed_or_open {
-        "open" => format!("{} on the recorded inputs", report.services.join(", ")),
-        _ => format!("all {} services", report.services.len()),
-    };
-    line(format!("{who}: {:.3} s of logical time in {:.3} s", report.logical_s, report.wall_s));
-    // Of a whole graph only the topics that differ are of interest.
-    let is_of_interest = |topic: &&TopicComparison| {
-        report.closed_or_open == "open" || topic.changed + topic.missing + topic.added > 0
-    };
-    let topics: Vec<&TopicComparison> = report.topics.iter().filter(is_of_interest).collect();
-    if !topics.is_empty() {
-        text += &table(&topics);
-    }
-    let mut line = |words: String| text += &(words + "\n");
-    for topic in topics {
-        for field in topic.fields.iter().filter(|_| report.closed_or_open == "open") {
-            line(format!(
-                "`{}`: `{}` differs in {} messages, by {} on average and {} at most",
-                topic.topic,
-                field.field,
-                field.messages,
-                rounded(field.mean),
-                rounded(field.largest)
-            ));
-        }
-        if let Some(first) = &topic.first {
-            line(format!("first {}", words(first)));
-        }
-    }
-    match (&report.digests, report.same) {
-        (Some(both), true) if both.recorded == both.rerun => {
-            line(format!("SAME: digest {} ({} messages)", both.rerun.digest, both.rerun.messages));
-        }
-        (_, true) => line("SAME: every message that was compared".to_owned()),
-        (both, false) => {
-            let first = report.difference.as_ref().map(|first| format!(": {}", words(first)));
-            line(format!("DIFFERENT{}", first.unwrap_or_default()));
-            if let Some(both) = both {
-                line(format!("  digest {} recorded, {} now", both.recorded.digest, both.rerun.digest));
-            }
-        }
-    }
-    text
-}
-
-fn table(topics: &[&TopicComparison]) -> String {
-    let mut table = comfy_table::Table::new();
-    table.load_style(comfy_table::presets::NOTHING);
-    table.set_header([
-        "topic",
-        "recorded",
-        "rerun",
-        "same",
-        "changed",
-        "missing",
-        "added",
-        "first difference",
-    ]);
-    for topic in topics {
-        let first = topic.first.as_ref().map(|first| format!("{:.6} s", first.stamp_ns as f64 * 1e-9));
-        let counts = [topic.recorded, topic.rerun, topic.same, topic.changed, topic.missing, topic.added];
-        let cells = counts.into_iter().map(|count| count.to_string());
-        table.add_row(std::iter::once(topic.topic.clone()).chain(cells).chain([first.unwrap_or_default()]));
-    }
-    format!("{table}\n")
-}
-
-fn words(difference: &Difference) -> String {
-    let Difference { topic, stamp_ns, field, a, b, .. } = difference;
-    let short = |value: &serde_json::Value| {
-        let text = value.to_string();
-        match text.char_indices().nth(160) {
-            Some((end, _)) => format!("{} ..", &text[..end]),
-            None => text,
-        }
-    };
-    let (seconds, nanos) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
-    let (a, b) = (short(a), short(b));
-    match (a.as_str(), b.as_str()) {
-        ("null", _) if field == "message" => {
-            format!("`{topic}` at {seconds}.{nanos:09} s: only the rerun has a message")
-        }
-        (_, "null") if field == "message" => {
-            format!("`{topic}` at {seconds}.{nanos:09} s: only the recording has a message")
-        }
-        _ => format!("`{topic}` at {seconds}.{nanos:09} s: `{field}` was {a} and is {b}"),
-    }
-}
-
-fn rounded(value: f64) -> String {
-    if value != 0.0 && (value.abs() < 1e-3 || value.abs() >= 1e6) {
-        format!("{value:.3e}")
-    } else {
-        format!("{value:.4}")
     }
 }

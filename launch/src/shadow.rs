@@ -4,6 +4,7 @@ use crate::cli::SwapArgs;
 use crate::console::{say, say_line};
 use crate::control::{self, Request};
 use crate::monitor::newest;
+use crate::numbers::{number, with_unit};
 use crate::signals::Signals;
 use board::clock;
 use board::host::{health_topic, shadow_role, shadow_topic};
@@ -28,6 +29,8 @@ pub(crate) struct Difference {
     pub(crate) pairs: u64,
     /// Pairs that are not equal.
     pub(crate) unequal: u64,
+    /// Pairs of numbers.
+    pub(crate) numbers: u64,
     /// Sum of the absolute differences of numbers.
     sum: f64,
     /// The largest of them.
@@ -40,14 +43,15 @@ impl Difference {
         self.unequal += u64::from(service != shadow);
         if let (Some(a), Some(b)) = (service.as_f64(), shadow.as_f64()) {
             let apart = (a - b).abs();
+            self.numbers += 1;
             self.sum += apart;
             self.max = self.max.max(apart);
         }
     }
 
-    /// Mean of the absolute differences.
+    /// Mean of the absolute differences of numbers.
     pub(crate) fn mean(&self) -> f64 {
-        if self.pairs == 0 { 0.0 } else { self.sum / self.pairs as f64 }
+        if self.numbers == 0 { 0.0 } else { self.sum / self.numbers as f64 }
     }
 }
 
@@ -195,19 +199,25 @@ fn as_text(role: &str, topics: &[Topic], steps: &[Health; 2]) -> String {
         us(steps[1].step_p50_ns),
         us(steps[1].step_p99_ns)
     );
-    for topic in topics {
-        let Comparison { said, would_say, fields, .. } = &topic.comparison;
-        text += &format!("\n{}: {said} messages, the shadow's {would_say}\n", topic.name);
+    text + &topics.iter().map(|topic| topic.comparison.text(&topic.name, &topic.message)).collect::<String>()
+}
+
+impl Comparison {
+    /// How often the two have spoken, and the fields in which they differ.
+    fn text(&self, topic: &str, message: &Description) -> String {
+        let Self { said, would_say, fields, .. } = self;
+        let mut text = format!("\n{topic}: {said} messages, the shadow's {would_say}\n");
         let mut table = Table::new();
         table.load_style(presets::NOTHING).set_header(["FIELD", "UNEQUAL", "MEAN", "LARGEST"]);
         for (path, difference) in fields.iter().filter(|(_, difference)| difference.unequal > 0) {
             let share = difference.unequal as f64 / difference.pairs.max(1) as f64 * 100.0;
-            table.add_row([
-                path.clone(),
-                format!("{share:.0} %"),
-                format!("{:.4}", difference.mean()),
-                format!("{:.4}", difference.max),
-            ]);
+            let shown = |value: f64| with_unit(&number(value), message.unit_at(path));
+            // Of words there is no difference in numbers.
+            let sizes = match difference.numbers {
+                0 => ["-", "-"].map(str::to_owned),
+                _ => [shown(difference.mean()), shown(difference.max)],
+            };
+            table.add_row([path.clone(), format!("{share:.0} %")].into_iter().chain(sizes));
         }
         for column in table.column_iter_mut().skip(1) {
             column.set_cell_alignment(CellAlignment::Right);
@@ -219,8 +229,8 @@ fn as_text(role: &str, topics: &[Topic], steps: &[Health; 2]) -> String {
         } else {
             text += &format!("{table}\n");
         }
+        text
     }
-    text
 }
 
 fn as_json(topics: &[Topic], steps: &[Health; 2]) -> Value {
@@ -231,7 +241,10 @@ fn as_json(topics: &[Topic], steps: &[Health; 2]) -> Value {
             .iter()
             .map(|(path, difference)| {
                 let Difference { pairs, unequal, max, .. } = *difference;
-                (path, json!({"pairs": pairs, "unequal": unequal, "mean": difference.mean(), "max": max}))
+                let (mean, unit) = (difference.mean(), topic.message.unit_at(path));
+                let found =
+                    json!({"pairs": pairs, "unequal": unequal, "mean": mean, "max": max, "unit": unit});
+                (path, found)
             })
             .collect();
         let Comparison { said, would_say, .. } = topic.comparison;
@@ -248,6 +261,7 @@ fn as_json(topics: &[Topic], steps: &[Health; 2]) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use messages::{Message as _, WheelSpeeds};
 
     #[test]
     fn neighbours_in_time_are_compared() {
@@ -269,6 +283,22 @@ mod tests {
         comparison.service(0, json!({"speed": 1.0}));
         comparison.shadow(10 * APART_NS, &json!({"speed": 2.0}));
         assert_eq!((comparison.would_say, comparison.fields.len()), (2, 0));
+    }
+
+    #[test]
+    fn differences_have_the_units_of_their_fields() {
+        let mut comparison = Comparison::default();
+        comparison.service(0, json!({"left_mps": 0.25, "right_mps": 0.25, "curvature": 1}));
+        comparison.shadow(0, &json!({"left_mps": 0.139_5, "right_mps": 0.25, "curvature": 2, "word": "x"}));
+        comparison
+            .fields
+            .insert("word".to_owned(), Difference { pairs: 1, unequal: 1, ..Difference::default() });
+        let text = comparison.text("wheels/desired", &WheelSpeeds::description());
+        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
+        assert!(lines.contains(&vec!["left_mps", "100", "%", "0.1105", "m/s", "0.1105", "m/s"]), "{text}");
+        assert!(lines.contains(&vec!["curvature", "100", "%", "1", "1"]), "{text}");
+        assert!(lines.contains(&vec!["word", "100", "%", "-", "-"]), "{text}");
+        assert!(!text.contains("right_mps"), "{text}");
     }
 
     #[test]

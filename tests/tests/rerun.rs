@@ -76,6 +76,72 @@ fn a_change_is_shown_where_it_begins() {
     check_differs(&file, &["--set", "tag-driver.sigma_m=0.2", "--closed"], "closed", "tag/ranges");
 }
 
+/// A whole drive of the ultrasonic robot, to its verdict.
+fn judged() -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("run.mcap");
+    let graph = Graph::load("nxt").seed(1).with(&["--record", file.to_str().unwrap()]);
+    let end = graph.run_in_lockstep();
+    assert_eq!(end["run"]["passed"], true, "{end:#}");
+    (folder, file)
+}
+
+#[test]
+fn a_closed_loop_tells_both_verdicts_and_what_a_change_came_to() {
+    let (_folder, file) = judged();
+    let (_, report) = rerun(&file, &[]);
+    let judge = &report["judge"];
+    assert_eq!(judge["recorded"], judge["rerun"], "{judge:#}");
+    assert_eq!(judge["recorded"]["verdict"], "passed", "{judge:#}");
+    assert!(
+        judge["figures"].as_array().unwrap().iter().all(|figure| figure["difference"] == 0.0),
+        "{judge:#}"
+    );
+    // A judge without patience.
+    let change = ["--set", "referee.time_limit_s=5", "--closed"];
+    let (code, report) = rerun(&file, &change);
+    let judge = &report["judge"];
+    assert_eq!(code, Some(1));
+    assert_eq!(
+        (&judge["recorded"]["verdict"], &judge["rerun"]["verdict"]),
+        (&"passed".into(), &"failed".into())
+    );
+    assert!(judge["rerun"]["remark"].as_str().unwrap().contains("not there after 5 s"), "{judge:#}");
+    let time = judge["figures"].as_array().unwrap().iter().find(|figure| figure["unit"] == "s").unwrap();
+    let [was, is, by] = ["recorded", "rerun", "difference"].map(|side| time[side].as_f64().unwrap());
+    assert!(is < was && (is - was - by).abs() < 1e-9, "{time:#}");
+    let printed = String::from_utf8(run(&file, &change).stdout).unwrap();
+    let lines: Vec<&str> = printed.lines().collect();
+    let place = |words: &str| lines.iter().position(|line| line.contains(words)).unwrap();
+    // The verdicts come before the topics.
+    assert!(place("recorded   PASSED") < place("rerun      FAILED"), "{printed}");
+    assert!(place("rerun      FAILED") < place("first difference"), "{printed}");
+}
+
+#[test]
+fn a_change_that_takes_longer_is_judged_at_its_own_end() {
+    let (_folder, file) = judged();
+    let (_, report) = rerun(&file, &["--set", "controller.speed_mps=0.04", "--closed"]);
+    let judge = &report["judge"];
+    assert_ne!(judge["rerun"]["verdict"], "undecided", "{judge:#}");
+}
+
+#[test]
+fn a_run_without_a_judge_says_so() {
+    let graphs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../launch/graphs").canonicalize().unwrap();
+    let text = std::fs::read_to_string(graphs.join("nxt.toml")).unwrap();
+    let lines = text.lines().filter(|line| !line.starts_with("finish")).map(|line| line.to_owned() + "\n");
+    let here = tempfile::tempdir().unwrap();
+    let graph = here.path().join("nobody-judges.toml");
+    let worlds = format!("\"{}/worlds/", graphs.parent().unwrap().display());
+    std::fs::write(&graph, lines.collect::<String>().replace("\"../worlds/", &worlds)).unwrap();
+    let (_folder, file) = recorded(Graph::load(graph.to_str().unwrap()).without("referee"));
+    let (_, report) = rerun(&file, &[]);
+    assert_eq!(report["judge"], Value::Null);
+    let remarks = report["remarks"].to_string();
+    assert!(remarks.contains("no topic of this graph is that of a judge"), "{remarks}");
+}
+
 #[test]
 fn swaps_and_parameters_of_the_run_are_on_record() {
     let graph =

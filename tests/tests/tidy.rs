@@ -101,6 +101,15 @@ fn no_service_depends_on_another() {
 }
 
 #[test]
+fn no_service_draws() {
+    for service in folders(&root().join("services")) {
+        let manifest = manifest(&service);
+        let known = manifest.get("dependencies").and_then(|value| value.as_table());
+        assert!(!known.is_some_and(|known| known.contains_key("pictures")), "{} draws", name(&service));
+    }
+}
+
+#[test]
 fn the_launcher_depends_on_no_service() {
     let names: Vec<String> = folders(&root().join("services")).iter().map(|service| name(service)).collect();
     for dependency in dependencies(&root().join("launch")) {
@@ -110,10 +119,14 @@ fn the_launcher_depends_on_no_service() {
 
 #[test]
 fn schemas_know_neither_board_nor_services() {
-    for (crate_name, allowed) in
-        [("files", &[][..]), ("geometry", &["files"][..]), ("messages", &["geometry", "messages-derive"][..])]
-    {
-        let inside = ["board", "launch", "tests", "files", "geometry", "messages", "messages-derive"];
+    for (crate_name, allowed) in [
+        ("files", &[][..]),
+        ("geometry", &["files"][..]),
+        ("messages", &["geometry", "messages-derive"][..]),
+        ("pictures", &["geometry"][..]),
+    ] {
+        let inside =
+            ["board", "launch", "tests", "files", "geometry", "messages", "messages-derive", "pictures"];
         for dependency in dependencies(&root().join("schemas").join(crate_name)) {
             let ours = inside.contains(&dependency.as_str());
             assert!(!ours || allowed.contains(&dependency.as_str()), "{crate_name} depends on {dependency}");
@@ -169,6 +182,7 @@ fn every_crate_obeys_the_one_lint_table() {
             "schemas/geometry",
             "schemas/messages",
             "schemas/messages/derive",
+            "schemas/pictures",
         ]
         .map(|name| root.join(name)),
     );

@@ -39,6 +39,8 @@ pub struct TopicComparison {
 pub struct FieldDifference {
     /// Its path in the message.
     pub field: String,
+    /// Its unit, empty for a pure number.
+    pub unit: String,
     /// In how many messages.
     pub messages: u64,
     /// Mean absolute difference over these.
@@ -167,10 +169,12 @@ impl Tally {
             let found = missing(a, ours, true);
             self.comparison.first.get_or_insert(found);
         }
+        let description = a.manifest().topic(&self.comparison.topic).map(|(_, topic)| &topic.message);
         let mut fields: Vec<FieldDifference> = self
             .fields
             .into_iter()
             .map(|(field, (messages, sum, largest))| FieldDifference {
+                unit: description.map_or("", |message| message.unit_at(&field)).to_owned(),
                 field,
                 messages,
                 mean: sum / messages as f64,

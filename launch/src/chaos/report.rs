@@ -3,6 +3,7 @@
 use super::plan::{Deed, Kind};
 use super::victims::Verdict;
 use super::witness::Stopping;
+use crate::statistics;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -254,12 +255,10 @@ impl Report {
     }
 }
 
-/// Median, 99 % and the largest.
+/// Median, 99 % and the largest; NaN without values.
 fn quantiles(values: &[f64]) -> [f64; 3] {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let at = |share: f64| sorted.get(((sorted.len() as f64 - 1.0) * share).round() as usize).copied();
-    [at(0.5), at(0.99), at(1.0)].map(|value| value.unwrap_or(f64::NAN))
+    let sorted = statistics::sorted(values);
+    [0.5, 0.99, 1.0].map(|share| statistics::quantile(&sorted, share).unwrap_or(f64::NAN))
 }
 
 #[cfg(test)]

@@ -1,97 +1,21 @@
 //! From an experiment file to its runs.
 
-use crate::graph::Overrides;
+use super::choice::Choice;
+use super::refusal::PlanError;
+use crate::graph::{Overrides, hint};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
+/// What a variant is called that changes nothing.
+const UNCHANGED: &str = "as the graph is";
 /// More runs than this are a slip in the file.
-const RUNS_MAX: usize = 100_000;
+pub(super) const RUNS_MAX: usize = 100_000;
 /// The largest experiment of ours has 3 KiB.
 const FILE_MAX: u64 = 1 << 20;
 /// What the runs of an experiment change, in bytes, all together.
 const CHANGES_MAX: usize = 256 << 20;
-
-/// Why an experiment file is refused.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum PlanError {
-    /// The file cannot be read.
-    #[error("cannot read the experiment file {file}: {cause}")]
-    Unreadable {
-        /// The file.
-        file: String,
-        /// Why.
-        cause: files::FileProblem,
-    },
-    /// The file is no experiment.
-    #[error("{file}: {cause}")]
-    Malformed {
-        /// The file.
-        file: String,
-        /// What is wrong, with its line.
-        cause: Box<toml::de::Error>,
-    },
-    /// Something to vary that is no list.
-    #[error("`{key}` takes a list of values, such as [{value}]")]
-    NotAList {
-        /// What varies.
-        key: String,
-        /// What is there instead.
-        value: String,
-    },
-    /// A list with nothing in it.
-    #[error("`{key}` is an empty list: give it a value, or remove it")]
-    EmptyList {
-        /// What varies.
-        key: String,
-    },
-    /// A binary that is not named by a text.
-    #[error("the role `{role}` takes a binary's name in quotes, not {value}")]
-    NotABinary {
-        /// The role.
-        role: String,
-        /// What is there instead.
-        value: String,
-    },
-    /// A ratio that is called like a figure.
-    #[error("the ratio `{name}` is made of itself: give it a name of its own")]
-    RatioOfItself {
-        /// The name.
-        name: String,
-    },
-    /// Two variants cannot be told apart.
-    #[error("two variants are called `{name}`: give each a name of its own")]
-    SameName {
-        /// The name.
-        name: String,
-    },
-    /// A variant's axis that the others do not have.
-    #[error("`{key}` is varied across in a variant, but not in the experiment: name it under [across] too")]
-    NotAnAxis {
-        /// The key.
-        key: String,
-    },
-    /// A limit that is none.
-    #[error("limit_s = {limit_s} is not above zero")]
-    NoLimit {
-        /// The limit.
-        limit_s: f64,
-    },
-    /// So many changes in so many runs that they do not fit into memory.
-    #[error(
-        "its runs change more than can be kept in mind: vary fewer parameters, or name long values in the graph"
-    )]
-    TooMuch,
-    /// No seeds, or far too much to do.
-    #[error(
-        "this makes {runs} runs; between 1 and {RUNS_MAX} are possible: change the seeds or what is varied"
-    )]
-    Size {
-        /// How many.
-        runs: usize,
-    },
-}
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -116,6 +40,8 @@ struct File {
     across: Table,
     #[serde(default)]
     variant: Vec<VariantTable>,
+    #[serde(default)]
+    needs: Vec<String>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -176,6 +102,8 @@ pub(super) struct Plan {
     pub(super) axes: Vec<String>,
     /// Variant by variant.
     pub(super) runs: Vec<Run>,
+    /// Parameters that name a file without which a variant cannot be run.
+    needs: Vec<String>,
 }
 
 /// What is compared with the others.
@@ -225,6 +153,16 @@ impl Changes {
         texts.into_iter().flatten().map(|text| text.len() + size_of::<String>()).sum()
     }
 
+    fn overrides(&self, seed: u64) -> Overrides {
+        Overrides {
+            set: self.set.clone(),
+            swap: self.swap.clone(),
+            without: self.without.clone(),
+            seed: Some(seed),
+            board: None,
+        }
+    }
+
     fn of_tables(set: &Table, swap: &Table, without: &[String]) -> Result<Self, PlanError> {
         let mut changes = Self { without: without.to_vec(), ..Self::default() };
         for (key, value) in set {
@@ -265,23 +203,49 @@ fn swapped(role: &str, binary: &Value) -> Result<String, PlanError> {
     }
 }
 
+impl Plan {
+    /// What makes a run the one that it is, whatever has changed in it since it was done.
+    pub(super) fn identity<'a>(&'a self, run: &'a Run) -> (&'a str, &'a [String], u64) {
+        (&self.variants[run.variant].name, &run.situation, run.seed)
+    }
+
+    /// Takes the variants out that need a file which is not there; `folder` is that from which the paths of
+    /// parameters count. Each with its name, and the file that is missing.
+    pub(super) fn leave_out_what_lacks_files(&mut self, folder: &Path) -> Vec<(String, PathBuf)> {
+        let lacks = |variant: usize| {
+            let run = self.runs.iter().find(|run| run.variant == variant)?;
+            let named = self.needs.iter().filter_map(|key| set_text(&run.overrides.set, key));
+            named.map(|file| folder.join(file)).find(|file| !file.is_file())
+        };
+        let lacking: Vec<Option<PathBuf>> = (0..self.variants.len()).map(lacks).collect();
+        let variants = std::mem::take(&mut self.variants).into_iter().zip(&lacking);
+        let (gone, kept): (Vec<_>, Vec<_>) = variants.partition(|(_, file)| file.is_some());
+        self.variants = kept.into_iter().map(|(variant, _)| variant).collect();
+        self.runs.retain(|run| lacking[run.variant].is_none());
+        for run in &mut self.runs {
+            run.variant -= lacking[..run.variant].iter().flatten().count();
+        }
+        gone.into_iter().filter_map(|(variant, file)| Some((variant.name, file.clone()?))).collect()
+    }
+}
+
 /// Reads an experiment file.
 ///
 /// # Errors
-/// Names what is wrong with it.
-pub(super) fn read(file: &Path) -> Result<Plan, PlanError> {
+/// Names what is wrong with it, or with what is chosen of it.
+pub(super) fn read(file: &Path, choice: &Choice) -> Result<Plan, PlanError> {
     let shown = file.display().to_string();
     let text = files::read_text(file, FILE_MAX)
         .map_err(|error| PlanError::Unreadable { file: shown.clone(), cause: error.problem })?;
     let stem = file.file_stem().and_then(|stem| stem.to_str()).unwrap_or("experiment");
-    parse(&text, stem, file.parent().unwrap_or(Path::new(""))).map_err(|error| match error {
+    parse(&text, stem, file.parent().unwrap_or(Path::new("")), choice).map_err(|error| match error {
         PlanError::Malformed { cause, .. } => PlanError::Malformed { file: shown, cause },
         other => other,
     })
 }
 
 /// The same of a text; `folder` is that of the file.
-pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanError> {
+pub(super) fn parse(text: &str, stem: &str, folder: &Path, choice: &Choice) -> Result<Plan, PlanError> {
     let mut file: File = toml::from_str(text)
         .map_err(|cause| PlanError::Malformed { file: stem.to_owned(), cause: Box::new(cause) })?;
     if !file.worlds.is_empty() {
@@ -305,49 +269,63 @@ pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanE
             expect: BTreeMap::new(),
         });
     }
-    let mut variants: Vec<Variant> = Vec::new();
-    let mut runs = Vec::new();
-    let (mut names, mut bytes) = (BTreeSet::new(), 0_usize);
+    let is_varied = |key: &&String| file.across.contains_key(*key) || file.vary.contains_key(*key);
+    if let Some(key) = choice.sweep.keys().find(is_varied) {
+        return Err(PlanError::VariedAlready { key: key.clone() });
+    }
+    let sweep = product(&choice.sweep)?;
+    let (mut variants, mut runs): (Vec<Variant>, Vec<Run>) = (Vec::new(), Vec::new());
+    let (mut known, mut bytes) = (BTreeSet::new(), 0_usize);
     for table in &file.variant {
-        let own = Changes::of_tables(&table.set, &table.swap, &table.without)?;
+        let own = for_all.and(&Changes::of_tables(&table.set, &table.swap, &table.without)?);
         let limit_s = table.limit_s.unwrap_or(file.limit_s);
         if !(limit_s > 0.0 && limit_s.is_finite()) {
             return Err(PlanError::NoLimit { limit_s });
         }
         let situations = product(&own_axes(&file.across, &table.across)?)?;
-        let seeds = table.seeds.as_ref().unwrap_or(&file.seeds).list();
-        let more = seeds.len().saturating_mul(situations.len()).saturating_mul(combinations.len());
-        if seeds.is_empty() || runs.len().saturating_add(more) > RUNS_MAX {
-            return Err(PlanError::Size { runs: runs.len().saturating_add(more) });
-        }
+        let seeds = table.seeds.as_ref().unwrap_or(&file.seeds);
+        let seeds = choice.seeds.clone().unwrap_or_else(|| seeds.list());
         for combination in &combinations {
-            let name = variant_name(&table.name, &file.vary, &combination.labels);
-            if !names.insert(name.clone()) {
-                return Err(PlanError::SameName { name });
+            let in_file = variant_name(&table.name, &file.vary, &combination.labels);
+            if !known.insert(in_file.clone()) {
+                return Err(PlanError::SameName { name: in_file });
             }
-            variants.push(Variant { name, expect: table.expect.clone() });
-            let changes = for_all.and(&own).and(combination);
-            for situation in &situations {
-                let changes = changes.and(situation);
-                bytes = bytes.saturating_add(changes.bytes().saturating_mul(seeds.len()));
-                if bytes > CHANGES_MAX {
-                    return Err(PlanError::TooMuch);
+            if !choice.only.is_empty() && !choice.only.contains(&in_file) {
+                continue;
+            }
+            for swept in &sweep {
+                let (name, expect) = match choice.sweep.is_empty() {
+                    true => (in_file.clone(), table.expect.clone()),
+                    // What the file expects, it expects of its own variants.
+                    false => (swept_name(&in_file, &choice.sweep, &swept.labels), BTreeMap::new()),
+                };
+                variants.push(Variant { name, expect });
+                let more = seeds.len().saturating_mul(situations.len()).saturating_add(runs.len());
+                if seeds.is_empty() || more > RUNS_MAX {
+                    return Err(PlanError::Size { runs: more });
                 }
-                runs.extend(seeds.iter().map(|&seed| Run {
-                    variant: variants.len() - 1,
-                    situation: situation.labels.clone(),
-                    seed,
-                    limit_s,
-                    overrides: Overrides {
-                        set: changes.set.clone(),
-                        swap: changes.swap.clone(),
-                        without: changes.without.clone(),
-                        seed: Some(seed),
-                        board: None,
-                    },
-                }));
+                let variant = variants.len() - 1;
+                let changes = own.and(combination).and(swept);
+                for situation in &situations {
+                    let changes = changes.and(situation);
+                    bytes = bytes.saturating_add(changes.bytes().saturating_mul(seeds.len()));
+                    if bytes > CHANGES_MAX {
+                        return Err(PlanError::TooMuch);
+                    }
+                    runs.extend(seeds.iter().map(|&seed| Run {
+                        variant,
+                        situation: situation.labels.clone(),
+                        seed,
+                        limit_s,
+                        overrides: changes.overrides(seed),
+                    }));
+                }
             }
         }
+    }
+    if let Some(name) = choice.only.iter().find(|name| !known.contains(*name)) {
+        let hint = hint(name, known.iter().map(String::as_str), "variants");
+        return Err(PlanError::NoSuchVariant { name: name.clone(), hint });
     }
     Ok(Plan {
         name: file.name.unwrap_or_else(|| stem.to_owned()),
@@ -356,6 +334,7 @@ pub(super) fn parse(text: &str, stem: &str, folder: &Path) -> Result<Plan, PlanE
         ratios: file.ratio,
         axes: file.across.keys().cloned().collect(),
         runs,
+        needs: file.needs,
     })
 }
 
@@ -396,13 +375,31 @@ fn product(axes: &Table) -> Result<Vec<Changes>, PlanError> {
 /// The name in the file, and what is varied beside it.
 fn variant_name(name: &str, axes: &Table, labels: &[String]) -> String {
     let short = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
+    // Of a path the file tells it.
     let varied = axes.keys().zip(labels).map(|(key, label)| match key.contains('.') {
-        true => format!("{}={label}", short(key)),
+        true => format!("{}={}", short(key), label.rsplit('/').next().unwrap_or(label)),
         false => label.clone(),
     });
     let parts: Vec<String> =
         Some(name.to_owned()).filter(|name| !name.is_empty()).into_iter().chain(varied).collect();
-    if parts.is_empty() { "as the graph is".to_owned() } else { parts.join(", ") }
+    if parts.is_empty() { UNCHANGED.to_owned() } else { parts.join(", ") }
+}
+
+/// The same of a variant of which a sweep makes several.
+fn swept_name(in_file: &str, axes: &Table, labels: &[String]) -> String {
+    variant_name(if in_file == UNCHANGED { "" } else { in_file }, axes, labels)
+}
+
+/// The text that a parameter is set to; `None` when it is not set, or to something else.
+fn set_text(set: &[String], key: &str) -> Option<String> {
+    let values = set.iter().filter_map(|set| set.split_once('='));
+    let (_, value) = values.rev().find(|(known, _)| known.trim() == key)?;
+    match format!("value = {value}").parse::<Table>().ok().and_then(|mut table| table.remove("value")) {
+        Some(Value::String(text)) => Some(text),
+        Some(_) => None,
+        // As on the command line, where a text needs no quotes.
+        None => Some(value.trim().to_owned()),
+    }
 }
 
 /// A graph's path counts from the experiment's folder; a bare name is looked up.

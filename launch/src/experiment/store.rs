@@ -58,47 +58,72 @@ pub(super) struct Record {
     pub(super) digest: String,
 }
 
+impl Record {
+    /// What makes a run the one that it is, whatever has changed in it since.
+    pub(super) fn identity(&self) -> (&str, &[String], u64) {
+        (&self.variant, &self.situation, self.seed)
+    }
+}
+
+/// What becomes of a record when an experiment goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Use {
+    /// It is one of the runs that are wanted.
+    Wanted,
+    /// It is of another seed or variant: it stays in the file, and is not looked at.
+    Aside,
+    /// Something in it has changed since: it is moved to `runs-outdated.csv`.
+    Outdated,
+}
+
 /// The file and all its records.
 #[derive(Debug)]
 pub(super) struct Store {
     path: PathBuf,
     axes: Vec<String>,
     figures: BTreeSet<String>,
+    /// Those that are wanted.
     pub(super) records: Vec<Record>,
+    /// Those that are kept beside them.
+    pub(super) aside: Vec<Record>,
     /// Open at its end while the columns suffice.
     file: Option<File>,
 }
 
 impl Store {
-    /// Opens the file, or begins it. Records for which `is_wanted` is false are moved to `runs-outdated.csv`; how many is returned.
+    /// Opens the file, or begins it; `use_of` says what becomes of each record. How many are outdated is
+    /// returned, too. Records of an experiment with other axes have no place in the same columns, and are
+    /// outdated all.
     ///
     /// # Errors
     /// When the disk does not let it.
     pub(super) fn open(
         path: &Path,
         axes: &[String],
-        is_wanted: impl Fn(&Record) -> bool,
+        use_of: impl Fn(&Record) -> Use,
     ) -> std::io::Result<(Self, usize)> {
-        let text = match fs::read(path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Vec::new(),
-            Err(error) => return Err(error),
-        };
-        let (known, outdated): (Vec<_>, Vec<_>) = parse(&text).into_iter().partition(&is_wanted);
-        if !outdated.is_empty() {
+        let (known_axes, known) = read(path)?;
+        let use_of = |record: &Record| if known_axes == axes { use_of(record) } else { Use::Outdated };
+        let count = known.iter().filter(|record| use_of(record) == Use::Outdated).count();
+        if count > 0 {
             fs::copy(path, path.with_file_name("runs-outdated.csv"))?;
         }
-        let count = outdated.len();
         let mut store = Self {
             path: path.to_owned(),
             axes: axes.to_vec(),
             figures: BTreeSet::new(),
             records: Vec::new(),
+            aside: Vec::new(),
             file: None,
         };
         for record in known {
+            let place = match use_of(&record) {
+                Use::Wanted => &mut store.records,
+                Use::Aside => &mut store.aside,
+                Use::Outdated => continue,
+            };
             store.figures.extend(record.figures.keys().cloned());
-            store.records.push(record);
+            place.push(record);
         }
         store.rewrite()?;
         Ok((store, count))
@@ -120,7 +145,8 @@ impl Store {
         file.sync_data()
     }
 
-    /// Puts the records into an order and writes all anew, so that an interrupted experiment leaves the same file as another.
+    /// Puts the records into an order and writes all anew, so that an interrupted experiment leaves the same
+    /// file as another.
     ///
     /// # Errors
     /// When the disk does not let it.
@@ -137,7 +163,7 @@ impl Store {
             .chain(middle)
             .chain(self.figures.iter().cloned())
             .chain([LAST.to_owned()]);
-        let rows = self.records.iter().map(|record| row(record, &self.figures));
+        let rows = self.records.iter().chain(&self.aside).map(|record| row(record, &self.figures));
         let text = lines(std::iter::once(header.collect()).chain(rows));
         // The old file stays whole until the new one is.
         let new = self.path.with_extension("csv.new");
@@ -178,23 +204,37 @@ fn lines(rows: impl IntoIterator<Item = Vec<String>>) -> Vec<u8> {
     writer.into_inner().unwrap_or_default()
 }
 
-/// The records of a file. A line that a crash cut short, or that means nothing, is left out: that run is done again.
-pub(super) fn parse(text: &[u8]) -> Vec<Record> {
+/// The axes and the records of a file; nothing when there is none.
+///
+/// # Errors
+/// When it is there and cannot be read.
+pub(super) fn read(path: &Path) -> std::io::Result<(Vec<String>, Vec<Record>)> {
+    match fs::read(path) {
+        Ok(text) => Ok(parse(&text)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Default::default()),
+        Err(error) => Err(error),
+    }
+}
+
+/// The axes and the records of a text. A line that a crash cut short, or that means nothing, is left out:
+/// that run is done again.
+pub(super) fn parse(text: &[u8]) -> (Vec<String>, Vec<Record>) {
     // What does not end in a line's end was being written.
     let end = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |place| place + 1);
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(&text[..end]);
-    let Ok(header) = reader.headers().cloned() else { return Vec::new() };
+    let Ok(header) = reader.headers().cloned() else { return Default::default() };
     let place = |name: &str| header.iter().position(|column| column == name);
-    let (Some(seed), Some(wall)) = (place("seed"), place("wall_s")) else { return Vec::new() };
+    let (Some(seed), Some(wall)) = (place("seed"), place("wall_s")) else { return Default::default() };
     let sound = header.len() > wall + 1
         && header.iter().take(2).eq(FIRST)
         && header.iter().skip(seed).take(MIDDLE.len()).eq(MIDDLE)
         && header.iter().next_back() == Some(LAST);
     if !sound {
-        return Vec::new();
+        return Default::default();
     }
+    let axes = header.iter().take(seed).skip(FIRST.len()).map(str::to_owned).collect();
     let rows = reader.records().filter_map(Result::ok).filter(|row| row.len() == header.len());
-    rows.filter_map(|row| {
+    let records = rows.filter_map(|row| {
         let text = |index: usize| row.get(index).unwrap_or_default();
         let figures = (wall + 1..header.len() - 1)
             .filter_map(|index| Some((header.get(index)?.to_owned(), text(index).parse().ok()?)));
@@ -210,6 +250,6 @@ pub(super) fn parse(text: &[u8]) -> Vec<Record> {
             figures: figures.collect(),
             digest: text(header.len() - 1).to_owned(),
         })
-    })
-    .collect()
+    });
+    (axes, records.collect())
 }

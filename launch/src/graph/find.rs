@@ -80,12 +80,14 @@ fn folders() -> Vec<PathBuf> {
 }
 
 fn known_in(folders: &[PathBuf]) -> Vec<String> {
-    let mut names: Vec<String> = folders
-        .iter()
-        // The current folder may hold any TOML; graphs have a folder of their own.
-        .filter(|folder| folder.ends_with("graphs"))
-        .filter_map(|folder| std::fs::read_dir(folder).ok())
-        .flat_map(|entries| entries.flatten())
+    // The current folder may hold any TOML; graphs have a folder of their own.
+    names_in(folders.iter().filter(|folder| folder.ends_with("graphs")))
+}
+
+/// The names of the TOML files in these folders, in order.
+pub(crate) fn names_in<'a>(folders: impl Iterator<Item = &'a PathBuf>) -> Vec<String> {
+    let entries = folders.filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().flatten();
+    let mut names: Vec<String> = entries
         .filter_map(|entry| {
             let path = entry.path();
             let stem = path.file_stem()?.to_str()?.to_owned();

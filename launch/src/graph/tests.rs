@@ -700,9 +700,25 @@ fn what_nobody_reads_is_a_note() {
 #[test]
 fn drawings() {
     let (checked, _) = Case::new(&[("test.toml", RIGHT)]).run();
-    let checked = checked.unwrap();
+    let mut checked = checked.unwrap();
     insta::assert_snapshot!("mermaid", mermaid(&checked));
     insta::assert_snapshot!("dot", dot(&checked));
+    // Topics that are not connected look otherwise, and the legend says how.
+    let words = ["nobody publishes it", "nobody reads it"];
+    let has = |drawing: &str| words.map(|words| drawing.contains(words));
+    assert_eq!([has(&mermaid(&checked)), has(&dot(&checked))], [[false; 2]; 2]);
+    let topic = |name: &str| checked.topics.iter().position(|topic| topic.name == name).unwrap();
+    let (ranges, clearance) = (topic("tof/ranges"), topic("safety/clearance"));
+    checked.topics[ranges].publisher = Publisher::Nobody;
+    checked.topics[clearance].readers.clear();
+    assert_eq!([has(&mermaid(&checked)), has(&dot(&checked))], [[true; 2]; 2]);
+    let line = |text: &str, id: usize| {
+        text.lines().find(|line| line.trim().starts_with(&format!("t{id}"))).unwrap().to_owned()
+    };
+    assert!(line(&mermaid(&checked), ranges).ends_with(":::unpublished"));
+    assert!(line(&mermaid(&checked), clearance).ends_with(":::unread"));
+    assert!(line(&dot(&checked), ranges).contains("rounded,dashed"));
+    assert!(line(&dot(&checked), clearance).contains("rounded,dotted"));
 }
 
 #[test]

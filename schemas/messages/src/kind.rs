@@ -207,6 +207,30 @@ impl Description {
         (self.fingerprint() != other.fingerprint()).then(|| "the named states differ".to_owned())
     }
 
+    /// The unit of the field at a path as tools write it (`anchors[3].range_m`, `elements[].x_m`, the
+    /// index left out or not); empty for a pure number, and when there is no such field.
+    pub fn unit_at(&self, path: &str) -> &str {
+        let mut steps = path.split('.').map(|step| step.split('[').next().unwrap_or_default()).peekable();
+        let mut record = self;
+        if let (Some(Kind::Record(element)), Some(&"elements")) = (&self.element, steps.peek()) {
+            record = element;
+            steps.next();
+        }
+        while let Some(step) = steps.next() {
+            let Some(field) = record.fields.iter().find(|field| field.name == step) else { return "" };
+            if steps.peek().is_none() {
+                return &field.unit;
+            }
+            let mut kind = &field.kind;
+            while let Kind::Array { of, .. } = kind {
+                kind = of;
+            }
+            let Kind::Record(inner) = kind else { return "" };
+            record = inner;
+        }
+        ""
+    }
+
     fn write_layout(&self, out: &mut String) {
         let _ = write!(out, "{}{{", self.name);
         for field in &self.fields {

@@ -40,6 +40,24 @@ fn a_message_describes_itself() {
     assert_eq!(turn.doc, "Turning speed, counter-clockwise.");
 }
 
+#[track_caller]
+fn check_unit(description: &Description, path: &str, expected: &str) {
+    assert_eq!(description.unit_at(path), expected, "{path}");
+}
+
+#[test]
+fn the_unit_of_a_field_is_found_by_its_path() {
+    check_unit(&Odometry::description(), "turn_rad_per_s", "rad/s");
+    check_unit(&TagRanges::description(), "anchors[3].range_m", "m");
+    check_unit(&TagRanges::description(), "anchors[].range_m", "m");
+    check_unit(&WorldTruth::description(), "elements[2].x_m", "m");
+    check_unit(&WorldTruth::description(), "elements[].x_m", "m");
+    check_unit(&TagRanges::description(), "anchors[3]", "");
+    for path in ["", ".", "nothing", "anchors[3].nothing", "turn_rad_per_s.x_m", "elements"] {
+        check_unit(&Odometry::description(), path, "");
+    }
+}
+
 #[test]
 fn fields_cover_every_byte() {
     fn covered(description: &Description) -> usize {

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     board::run(board::about!(), |node, params: Params| {
+        params.check_log()?;
         let mut odometry = node.publisher::<Odometry>("wheels/odometry")?;
         let mut tag = node.publisher::<TagRanges>("tag/ranges")?;
         let mut scan = node.publisher::<RangeScan>("laser/scan")?;

@@ -238,6 +238,22 @@ pub enum ParamsError {
         /// The file of true poses.
         truth: String,
     },
+    /// No log, although something is said about it.
+    #[error(
+        "file is empty, so there is nothing to play: name the log, in the graph or with `--set log-player.file=PATH`"
+    )]
+    NoLog,
+}
+
+impl Params {
+    /// Whether a log is named. The defaults name none, since a service has to say what it is without one.
+    ///
+    /// # Errors
+    /// When anything is set and the log is not.
+    pub fn check_log(&self) -> Result<(), ParamsError> {
+        let names_one = !self.file.is_empty() || *self == Self::default();
+        if names_one { Ok(()) } else { Err(ParamsError::NoLog) }
+    }
 }
 
 impl Parameters for Params {

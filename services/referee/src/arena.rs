@@ -129,10 +129,10 @@ impl ArenaRun {
         let stage = self.journey.stage.get().unwrap_or(JourneyStageName::Waiting);
         let remark = self.journey.remark;
         if self.contacts > 0 {
-            let at = self.pose.map_or(String::new(), |pose| {
-                format!(" at {:.3}, {:.3}, {:.0} deg", pose.x_m, pose.y_m, pose.heading_rad.to_degrees())
-            });
-            return (RunState::Failed, format!("the robot touched a wall{at}, {stage:?}"));
+            let at = self
+                .pose
+                .map_or(String::new(), |pose| format!(", at x {:.2} m, y {:.2} m", pose.x_m, pose.y_m));
+            return (RunState::Failed, format!("touched a wall after {:.1} s{at} ({stage:?})", self.now_s));
         }
         match stage {
             JourneyStageName::Arrived if error_m <= params.max_target_error_m => {

@@ -189,9 +189,8 @@ impl Delivery {
 
     fn rule(&self, params: &Params, now: Time) -> Ruling {
         if self.contacts > 0 {
-            let what = self.touched.map(|touched| self.name(touched)).unwrap_or_default();
-            let contacts = self.contacts;
-            return (RunState::Failed, format!("the robot touched something {contacts} times, first {what}"));
+            let what = self.touched.map_or("touched something".to_owned(), |touched| self.name(touched));
+            return (RunState::Failed, what);
         }
         let faulty_s = self.fault_since.map_or(0.0, |since| now.seconds_since(since));
         if self.fault_since.is_some() && faulty_s >= params.fault_limit_s {
@@ -228,21 +227,25 @@ impl Delivery {
         (RunState::Running, format!("{} of {} delivered{more}", self.delivered, params.deliveries))
     }
 
-    /// What was near, and from where, in words.
+    /// What was touched, when, and where the robot was, in words.
     fn name(&self, nearness: Nearness) -> String {
-        let Nearness { surface, pose, at_s, distance_m } = nearness;
-        let furniture = |index: u32| self.world.furniture.get(index as usize);
-        let door = |index: u32| self.world.doors.get(index as usize);
+        let Nearness { surface, pose, at_s, .. } = nearness;
         let what = match surface {
-            Surface::Furniture(index) => furniture(index)
-                .map(|item| format!("{:?} at {:.1}, {:.1}", item.kind, item.pose.x_m, item.pose.y_m)),
-            Surface::Door(index) => door(index).map(|door| format!("door {}", door.room)),
-            other => Some(format!("{other:?}")),
+            Surface::Furniture(index) => match self.world.furniture.get(index as usize) {
+                Some(item) => format!("a {}", in_words(&format!("{:?}", item.kind))),
+                None => "a piece of furniture".to_owned(),
+            },
+            Surface::Door(index) => match self.world.doors.get(index as usize) {
+                Some(door) => format!("the door of {}", door.room),
+                None => "a door".to_owned(),
+            },
+            Surface::Wall(_) => "a wall".to_owned(),
+            Surface::Floor => "the floor".to_owned(),
+            Surface::Elevator(_) => "the door of an elevator".to_owned(),
+            Surface::Walker(_) => "a person".to_owned(),
+            Surface::Robot(_) => "a robot".to_owned(),
         };
-        let what = what.unwrap_or_default();
-        let Pose2 { x_m, y_m, .. } = pose;
-        let degrees = pose.heading_rad.to_degrees();
-        format!("{what}, {distance_m:.2} m from {x_m:.2}, {y_m:.2}, {degrees:.0} deg, after {at_s:.1} s")
+        format!("touched {what} after {at_s:.1} s, at x {:.2} m, y {:.2} m", pose.x_m, pose.y_m)
     }
 
     pub(crate) fn write(&self, summary: &mut RunSummary) {
@@ -259,4 +262,16 @@ impl Delivery {
         summary.push("localisation error, mean", self.comparison.errors.mean_m(), "m");
         summary.push("localisation error, 95 %", self.comparison.errors.quantile_m(0.95), "m");
     }
+}
+
+/// `MailCart` as people write it.
+fn in_words(name: &str) -> String {
+    let mut words = String::new();
+    for letter in name.chars() {
+        if letter.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(letter.to_lowercase());
+    }
+    words
 }

@@ -153,14 +153,14 @@ fn a_contact_fails_at_once_and_for_good() {
     run.drive_to(2.0, 5.0);
     run.truth.contacts = 1;
     run.drive_to(2.1, 0.1);
-    run.expect(RunState::Failed, "touched something 1 times");
+    run.expect(RunState::Failed, "touched a wall after 5.0 s, at x 2.05 m, y ");
     run.truth.contacts = 0;
     run.drive_to(10.0, 5.0).status(DeliveryStatusName::AtDoor, 0, 1.0).status(
         DeliveryStatusName::Delivered,
         1,
         0.5,
     );
-    run.expect(RunState::Failed, "touched something");
+    run.expect(RunState::Failed, "touched a wall after 5.0 s");
 }
 
 #[test]

@@ -1,11 +1,15 @@
-//! Draws the radar charts of Fig. 4 (NXT-036): `cargo run -p ultrasonic-driver --example radar -- OUT_DIR`.
+//! Draws the radar charts of Fig. 4 (NXT-036):
 //!
-//! For scans at (20, 85) with heading 0 and at (86, 85) in the first arena: where the rays meet the walls (a, c), and simulated ideal
-//! readings against those with all errors (b, d), with the four windows that are kept.
+//! `cargo run --release -p ultrasonic-driver --example radar -- OUT_DIR`.
+//!
+//! For scans at (0.20 m, 0.85 m) with heading 0 and at (0.86 m, 0.85 m) in the first arena: where the rays
+//! meet the walls (a, c), and simulated ideal readings against those with all errors (b, d), with the four
+//! windows that are kept.
 #![allow(clippy::print_stdout, reason = "an example says what it wrote")]
 
 use geometry::{Point2, Pose2, World};
-use plotters::prelude::*;
+use pictures::colours::{BLACK, BLUE, GREY, ORANGE, VERMILLION};
+use pictures::{Glyph, Layer, Plan, Sheet};
 use std::error::Error;
 use std::path::Path;
 use ultrasonic_driver::{NoiseProfile, Params, Reading, SimulatedSonar};
@@ -14,27 +18,34 @@ const WORLD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../launch/worlds/ar
 /// Half of a window (NXT-041).
 const WINDOW_DEG: i32 = 15;
 const REACH_M: f64 = 1.15;
+const SEED: u64 = 4;
+const SIDE_PX: f64 = 430.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args().nth(1).ok_or("usage: radar OUT_DIR")?;
-    std::fs::create_dir_all(&folder)?;
+    write(Path::new(&folder))
+}
+
+/// Writes a picture a pose into this folder.
+pub(crate) fn write(folder: &Path) -> Result<(), Box<dyn Error>> {
+    std::fs::create_dir_all(folder)?;
     let world = World::load(WORLD)?;
     for (name, x_m, y_m) in [("radar-20-85", 0.20, 0.85), ("radar-86-85", 0.86, 0.85)] {
-        let file = Path::new(&folder).join(format!("{name}.svg"));
-        draw(&file, &world, Pose2::new(x_m, y_m, 0.0))?;
+        let file = folder.join(format!("{name}.svg"));
+        std::fs::write(&file, sheet(&world, Pose2::new(x_m, y_m, 0.0)).svg()?)?;
         println!("{}", file.display());
     }
     Ok(())
 }
 
-/// Where a reading lies, seen from the sensor.
-fn polar(degree: i32, range_m: f64) -> (f64, f64) {
+/// Where a reading lies, seen from the sensor: ahead and to the left.
+fn polar(degree: i32, range_m: f64) -> Point2<f64> {
     let (sine, cosine) = f64::from(degree).to_radians().sin_cos();
-    (range_m * cosine, range_m * sine)
+    Point2::new(range_m * cosine, range_m * sine)
 }
 
-fn scan(world: &World, pose: Pose2, params: Params) -> Vec<(f64, f64)> {
-    let mut sonar = SimulatedSonar::in_world(params, world, 4);
+fn scan(world: &World, pose: Pose2, params: Params) -> Vec<Point2<f64>> {
+    let mut sonar = SimulatedSonar::in_world(params, world, SEED);
     let reading = |degree: i32| {
         let direction = Pose2::new(0.0, 0.0, f64::from(degree).to_radians());
         match sonar.measure(0, pose.compose(direction)) {
@@ -46,62 +57,49 @@ fn scan(world: &World, pose: Pose2, params: Params) -> Vec<(f64, f64)> {
     (0..=360).map(reading).collect()
 }
 
-fn draw(file: &Path, world: &World, pose: Pose2) -> Result<(), Box<dyn Error>> {
-    let area = SVGBackend::new(file, (1000, 540)).into_drawing_area();
-    area.fill(&WHITE)?;
-    let (left, right) = area.split_horizontally(500);
-    let title = format!("scan at ({:.0}, {:.0})", 100.0 * pose.x_m, 100.0 * pose.y_m);
+/// The arena at the left, what the sensor hears at the right.
+fn sheet(world: &World, pose: Pose2) -> Sheet {
+    let title = format!("A sonar scan at x {:.2} m, y {:.2} m, heading 0", pose.x_m, pose.y_m);
+    let words = format!(
+        "1 scan of 361 readings, a degree apart, from the first arena; errors with seed {SEED} (NXT-036). No echo counts as \
+         {REACH_M} m. Of a scan only the readings in the four windows are kept (NXT-041)."
+    );
+    Sheet::new(&title, &words).with(arena(world, pose)).with(radar(world, pose))
+}
 
-    let mut map = ChartBuilder::on(&left)
-        .caption(format!("{title}: where rays meet walls"), ("sans-serif", 18))
-        .margin(12)
-        .x_label_area_size(30)
-        .y_label_area_size(40)
-        .build_cartesian_2d(-0.1..1.2, -0.1..1.2)?;
-    map.configure_mesh().light_line_style(TRANSPARENT).x_desc("x [m]").y_desc("y [m]").draw()?;
+fn arena(world: &World, pose: Pose2) -> Plan {
     let walls = world.wall_segments(0);
-    map.draw_series(
-        walls
-            .iter()
-            .map(|wall| PathElement::new([(wall.a.x, wall.a.y), (wall.b.x, wall.b.y)], RED.stroke_width(2))),
-    )?;
-    let lines = geometry::Walls::new(walls);
+    let lines = walls.iter().map(|wall| vec![wall.a, wall.b]).collect();
+    let cast = geometry::Walls::new(walls);
     let hits = (0..360).step_by(3).filter_map(|degree| {
-        let hit = lines.cast(pose.position(), f64::from(degree).to_radians(), 10.0)?;
-        let (ahead_m, aside_m) = polar(degree, hit.range_m);
-        let end = pose.transform(Point2::new(ahead_m, aside_m));
-        Some(Circle::new((end.x, end.y), 3, RGBColor(220, 170, 0).filled()))
+        let hit = cast.cast(pose.position(), f64::from(degree).to_radians(), 10.0)?;
+        Some(pose.transform(polar(degree, hit.range_m)))
     });
-    map.draw_series(hits)?;
-    map.draw_series([Circle::new((pose.x_m, pose.y_m), 5, BLACK.filled())])?;
+    Plan::new("Where rays meet walls", Point2::new(-0.1, -0.1), Point2::new(1.2, 1.2), [SIDE_PX, SIDE_PX])
+        .with(Layer::lines("walls", BLACK, 2.0, lines))
+        .with(Layer::places(
+            "where a ray meets a wall, 3 degrees apart",
+            ORANGE,
+            Glyph::Dot(3.0),
+            hits.collect(),
+        ))
+        .with(Layer::poses("the sensor and its heading", BLUE, 18.0, vec![pose]))
+}
 
-    let mut radar = ChartBuilder::on(&right)
-        .caption(format!("{title}: ideal (red), with errors (blue)"), ("sans-serif", 18))
-        .margin(12)
-        .build_cartesian_2d(-1.2..1.2, -1.2..1.2)?;
-    for ring in 1..=4 {
-        let circle = (0..=90).map(|step| polar(4 * step, 0.25 * f64::from(ring)));
-        radar.draw_series([PathElement::new(circle.collect::<Vec<_>>(), RGBColor(210, 210, 210))])?;
-        radar.draw_series([Text::new(
-            format!("{} cm", 25 * ring),
-            (0.01, 0.25 * f64::from(ring) + 0.02),
-            ("sans-serif", 11).into_font().color(&RGBColor(120, 120, 120)),
-        )])?;
-    }
-    for quarter in 0..4 {
+fn radar(world: &World, pose: Pose2) -> Plan {
+    let ring = |range_m: f64| (0..=90).map(|step| polar(4 * step, range_m)).collect::<Vec<_>>();
+    let rings = [0.25, 0.5, 0.75, 1.0].map(ring).to_vec();
+    let windows = (0..4).flat_map(|quarter| {
         let arc = (-WINDOW_DEG..=WINDOW_DEG).map(|aside| polar(90 * quarter + aside, REACH_M));
         let side = |degree: i32| (0..=30).map(move |step| polar(degree, REACH_M * f64::from(step) / 30.0));
         let (right, left) = (side(90 * quarter - WINDOW_DEG), side(90 * quarter + WINDOW_DEG));
-        for line in [arc.collect::<Vec<_>>(), right.collect(), left.collect()] {
-            // Dotted: every other piece.
-            radar.draw_series(
-                line.windows(2).step_by(2).map(|piece| PathElement::new(piece.to_vec(), BLACK)),
-            )?;
-        }
-    }
+        [arc.collect::<Vec<_>>(), right.collect(), left.collect()]
+    });
     let ideal = Params { noise: NoiseProfile::None, half_cone_deg: 0.0, ..Params::default() };
-    radar.draw_series([PathElement::new(scan(world, pose, Params::default()), BLUE.stroke_width(1))])?;
-    radar.draw_series([PathElement::new(scan(world, pose, ideal), RED.stroke_width(2))])?;
-    area.present()?;
-    Ok(())
+    Plan::new("What the sensor hears", Point2::new(-1.2, -1.2), Point2::new(1.2, 1.2), [SIDE_PX, SIDE_PX])
+        .with_axes("ahead", "to the left")
+        .with(Layer::lines("0.25, 0.5, 0.75 and 1 m away", GREY, 1.0, rings).covering(0.45))
+        .with(Layer::dashed("windows that are kept", BLACK, 1.0, windows.collect()))
+        .with(Layer::lines("with all errors", BLUE, 1.5, vec![scan(world, pose, Params::default())]))
+        .with(Layer::lines("ideal: a ray without errors", VERMILLION, 2.0, vec![scan(world, pose, ideal)]))
 }

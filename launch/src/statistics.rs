@@ -1,4 +1,4 @@
-//! What samples say: means with their uncertainty, rates with theirs.
+//! What samples say: means with their uncertainty, rates with theirs, what a change has changed, quantiles.
 
 use std::f64::consts::FRAC_2_PI;
 
@@ -7,19 +7,31 @@ const Z_95: f64 = 1.959_963_984_540_054;
 
 /// A sample in four numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Summary {
+pub(crate) struct Summary {
     /// How many values.
-    pub(super) count: usize,
+    pub(crate) count: usize,
     /// Their mean.
-    pub(super) mean: f64,
+    pub(crate) mean: f64,
     /// Their standard deviation (n - 1); NaN for a single value.
-    pub(super) deviation: f64,
+    pub(crate) deviation: f64,
     /// The 95 % interval of the mean reaches so far to each side (Student's t); NaN for a single value.
-    pub(super) margin: f64,
+    pub(crate) margin: f64,
+}
+
+impl Summary {
+    /// The ends of the 95 % interval of the mean; `None` for a single value.
+    pub(crate) fn interval(&self) -> Option<[f64; 2]> {
+        (!self.margin.is_nan()).then_some([self.mean - self.margin, self.mean + self.margin])
+    }
+
+    /// Whether the interval leaves out 0: of a difference, that there is one.
+    pub(crate) fn is_apart_from_zero(&self) -> bool {
+        self.interval().is_some_and(|[low, high]| low > 0.0 || high < 0.0)
+    }
 }
 
 /// Mean, standard deviation and 95 % interval; `None` without values.
-pub(super) fn summary(values: &[f64]) -> Option<Summary> {
+pub(crate) fn summary(values: &[f64]) -> Option<Summary> {
     let count = values.len();
     if count == 0 {
         return None;
@@ -35,8 +47,9 @@ pub(super) fn summary(values: &[f64]) -> Option<Summary> {
     Some(Summary { count, mean, deviation, margin })
 }
 
-/// The 95 % interval of a rate by Wilson (1927): sound also for no or all successes, where the textbook's interval has no width.
-pub(super) fn wilson(successes: usize, count: usize) -> Option<(f64, f64)> {
+/// The 95 % interval of a rate by Wilson (1927): sound also for no or all successes, where the textbook's
+/// interval has no width.
+pub(crate) fn wilson(successes: usize, count: usize) -> Option<(f64, f64)> {
     if count == 0 {
         return None;
     }
@@ -50,7 +63,7 @@ pub(super) fn wilson(successes: usize, count: usize) -> Option<(f64, f64)> {
 }
 
 /// Within ± this lie 95 % of Student's distribution with so many degrees of freedom.
-pub(super) fn student_quantile(freedom: usize) -> f64 {
+pub(crate) fn student_quantile(freedom: usize) -> f64 {
     if freedom == 0 {
         return f64::NAN;
     }
@@ -79,11 +92,40 @@ fn student_within(t: f64, freedom: usize) -> f64 {
     if odd { FRAC_2_PI * (angle + sine * sum) } else { sine * sum }
 }
 
-/// The value below which a share of the sorted values lies, linear between neighbours; `None` without values.
-pub(super) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+/// How likely pairs of runs are to pass so unevenly when it makes no difference which of the two it is:
+/// McNemar's test, exact and two-sided, of the pairs in which only the one or only the other passed. 1
+/// without such pairs.
+pub(crate) fn mcnemar(only_one: usize, only_other: usize) -> f64 {
+    let (less, all) = (only_one.min(only_other), only_one + only_other);
+    // Of all ways in which as many coins can fall, those at least as uneven to one side; by logarithms, since
+    // 2^1100 is no number.
+    let half_power = -(all as f64) * std::f64::consts::LN_2;
+    let (mut ways_ln, mut tail) = (0.0_f64, 0.0_f64);
+    for count in 0..=less {
+        if count > 0 {
+            ways_ln += ((all - count + 1) as f64 / count as f64).ln();
+        }
+        tail += (ways_ln + half_power).exp();
+    }
+    (2.0 * tail).min(1.0)
+}
+
+/// The values in order, for [`quantile`].
+pub(crate) fn sorted(values: &[f64]) -> Vec<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted
+}
+
+/// The value below which a share of the sorted values lies, linear between neighbours (Hyndman and Fan 1996,
+/// type 7); `None` without values.
+pub(crate) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     let place = share.clamp(0.0, 1.0) * last as f64;
     let below = place.floor();
     let (low, high) = (sorted[below as usize], sorted[(below as usize + 1).min(last)]);
     Some(low + (place - below) * (high - low))
 }
+
+#[cfg(test)]
+mod tests;
