@@ -121,7 +121,7 @@ Exit code: 0 the run passed or was stopped, 1 refused or failed.
 
 Examples:
   launch up coffee
-  launch up coffee --without referee --set planner.launch.log=debug
+  launch up coffee --without current-state --set planner.launch.log=debug
   launch up coffee --stay --set navigator.default_order=\"\"      waits for orders
   launch up ./my-robot.toml --detach --board lab-2";
 

@@ -1,9 +1,10 @@
 //! `launch up --detach`: the launcher goes on by itself.
 
-use crate::console::{say, say_line};
+use crate::console::{say, say_line, warn};
 use crate::control;
 use board::clock;
 use board::host;
+use board::logout;
 use board::place::Place;
 use rustix::event::{PollFd, PollFlags, poll};
 use std::io::{PipeReader, Read as _};
@@ -69,6 +70,9 @@ pub(crate) fn detach(board: &str) -> Result<(), String> {
         "the board `{board}` is up (launcher {}); `launch attach`, `launch ps`, `launch logs`, `launch stop`",
         child.id()
     ));
+    if let Some(why) = logout::removes_shared_memory() {
+        warn(&format!("warning: {why}"));
+    }
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 
 mod cleaner;
 mod process;
-mod pulse;
+pub(crate) mod pulse;
 mod strays;
 mod swap;
 

@@ -31,7 +31,7 @@ fn head_of_a_map(folder: &Path) -> String {
     png.extend(b"\x00\x00\x00\x05IDATxxxxx\x00\x00\x00\x00");
     std::fs::write(folder.join("map.png"), png).unwrap();
     let yaml = folder.join("map.yaml");
-    std::fs::write(&yaml, "image: map.png\nresolution: 0.05\norigin: [0, 0, 0]\n").unwrap();
+    std::fs::write(&yaml, "image: map.png\nresolution: 0.05\norigin: [0, 0, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.2\nnegate: 0\n").unwrap();
     text(&yaml)
 }
 

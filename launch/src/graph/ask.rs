@@ -4,6 +4,7 @@
 //! reads what comes meanwhile.
 
 use super::check::QueryError;
+use crate::supervise::pulse::{Doing, LOOK_MAX, vitals};
 use board::clock;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
@@ -23,7 +24,9 @@ const ANSWER_MAX: usize = 16 << 20;
 pub(super) struct Patience {
     /// So much of a processor's time: it does something that it should not do.
     pub(super) processor: Duration,
-    /// And so much time on the wall: it waits for something that never comes.
+    /// So much time asleep: it waits for something that never comes, and neither for a processor nor for the disk.
+    pub(super) asleep: Duration,
+    /// And so much time on the wall, whatever it does.
     pub(super) wall: Duration,
     /// After so long somebody is told that it is slow.
     pub(super) first_word: Duration,
@@ -34,6 +37,7 @@ pub(super) struct Patience {
 /// For a person before a terminal, on a robot's computer that may be busy.
 pub(super) const PATIENCE: Patience = Patience {
     processor: Duration::from_secs(10),
+    asleep: Duration::from_secs(10),
     wall: Duration::from_secs(60),
     first_word: Duration::from_secs(3),
     next_word: Duration::from_secs(5),
@@ -88,6 +92,7 @@ fn wait(
     let pidfd = pidfd_open(pid, PidfdFlags::empty()).map_err(|error| cannot(error.into()))?;
     let begun = clock::monotonic();
     let mut next_word = patience.first_word;
+    let (mut asleep, mut last) = (Duration::ZERO, begun);
     loop {
         let mut fds = vec![PollFd::new(&pidfd, PollFlags::IN)];
         fds.extend(
@@ -103,10 +108,19 @@ fn wait(
         if has_ended {
             return Ok(());
         }
-        let spent = Spent { wall: clock::monotonic().since(begun), processor: processor_time(child.id()) };
+        let now = clock::monotonic();
+        if vitals(child.id()).is_some_and(|vitals| vitals.doing == Doing::Rests) {
+            asleep += now.since(last).min(LOOK_MAX);
+        }
+        last = now;
+        let spent = Spent { wall: now.since(begun), processor: processor_time(child.id()) };
         if spent.processor > patience.processor {
             let (limit, what) = (patience.processor.as_secs_f64(), "of processor time");
             return Err(QueryError::Broken(format!("no answer within {limit} s {what}")));
+        }
+        if asleep > patience.asleep {
+            let limit = patience.asleep.as_secs_f64();
+            return Err(QueryError::Broken(format!("no answer within {limit} s in which it only waited")));
         }
         if spent.wall > patience.wall {
             let (limit, used) = (patience.wall.as_secs_f64(), spent.processor.as_secs_f64());
@@ -177,6 +191,7 @@ mod tests {
 
     const SHORT: Patience = Patience {
         processor: Duration::from_millis(300),
+        asleep: Duration::from_millis(900),
         wall: Duration::from_millis(1500),
         first_word: Duration::from_millis(100),
         next_word: Duration::from_millis(200),
@@ -214,8 +229,8 @@ mod tests {
     }
 
     #[test]
-    fn who_waits_is_measured_by_the_wall() {
-        let words = refused("sleep 60", "no answer within 1.5 s (0.0 s of processor time)");
+    fn who_waits_is_measured_by_its_sleep() {
+        let words = refused("sleep 60", "no answer within 0.9 s in which it only waited");
         assert!(
             !words.is_empty() && words.windows(2).all(|pair| pair[1].wall - pair[0].wall >= SHORT.next_word)
         );

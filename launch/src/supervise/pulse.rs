@@ -9,7 +9,7 @@ use messages::Time;
 use std::time::Duration;
 
 /// A look that comes later than this says nothing about what was in between.
-const LOOK_MAX: Duration = Duration::from_millis(250);
+pub(crate) const LOOK_MAX: Duration = Duration::from_millis(250);
 
 /// What the kernel says of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -285,6 +285,7 @@ impl Supervisor {
     pub(super) fn tend_newcomer(&mut self, index: usize, now: Time) {
         let Some(newcomer) = &mut self.services[index].newcomer else { return };
         if let Some(status) = newcomer.process.ended() {
+            self.strays.expect();
             let why = format!("`{}` {}", newcomer.request.service.run, death(status));
             self.fail_newcomer(index, &why);
             self.clean();
@@ -441,6 +442,7 @@ impl Supervisor {
         }
         for index in gone.into_iter().rev() {
             let (process, _) = self.leaving.swap_remove(index);
+            self.strays.expect();
             self.host.switchboard().release(process.slot);
             self.clean();
         }

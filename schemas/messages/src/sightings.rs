@@ -182,7 +182,8 @@ mod tests {
         check_left(|all| all.forget(at(20_001), Pose2::IDENTITY, &HULL, 0.0), 0);
         check_left(|all| all.forget(at(1), Pose2::new(-1.0, 0.0, 0.0), &HULL, 0.0), 0);
         check_left(|all| all.forget(at(1), Pose2::new(0.6, 0.0, 0.0), &HULL, 0.0), 0);
-        check_left(|all| all.forget(at(1), Pose2::IDENTITY, &HULL, 0.495), 2);
+        check_left(|all| all.forget(at(1), Pose2::IDENTITY, &HULL, 0.495), 3);
+        check_left(|all| all.forget(at(1), Pose2::IDENTITY, &HULL, 0.505), 0);
         check_left(|all| (0..2).for_each(|_| all.see_through(ahead, 0.8, TOF_SLOPE)), 3);
         check_left(|all| (0..3).for_each(|_| all.see_through(ahead, 0.8, TOF_SLOPE)), 0);
         check_left(|all| (0..3).for_each(|_| all.see_through(ahead, f64::INFINITY, TOF_SLOPE)), 0);

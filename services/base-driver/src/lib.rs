@@ -248,7 +248,10 @@ impl BaseDriver {
                 Room::Ordered => self.orders.allows(&way),
                 Room::Seen | Room::Unchecked => {
                     let margin_m = off_m(&wanted.clearance);
-                    self.trail.allows(&self.hull, way.iter().map(|pose| here.compose(*pose)))
+                    // What is not told to go back may go on, also from behind the ground that is known.
+                    let is_back = told.left_mps + told.right_mps < 0.0;
+                    let places = way.iter().map(|pose| here.compose(*pose));
+                    (!is_back || self.trail.allows(&self.hull, places))
                         && stopping::keeps_off(&self.hull, &way, &near, margin_m)
                 }
             }

@@ -47,6 +47,11 @@ const ASSUMED_NEARER_M: f64 = 0.015;
 const ASSUMED_S: f64 = 1.0;
 /// What is assumed does not reach nearer to the hull than this: the robot stands there.
 const ASSUMED_OFF_M: f64 = 0.02;
+/// What is seen beside the robot, nearer than this, and is no wall may reach as far as the corner of the hull next to the sensor, where no
+/// sensor looks, and there be nearer still by this share, but not nearer than so much.
+const BESIDE_M: f64 = 0.25;
+const CORNER_SHARE: f64 = 0.5;
+const CORNER_LEAST_M: f64 = 0.03;
 /// Walls of the map count while the pose is known so well (one standard deviation).
 const SURE_M: f64 = 0.10;
 const SURE_RAD: f64 = 0.10;
@@ -139,6 +144,7 @@ impl Near {
             }
         }
         self.assume(&feet);
+        self.assume_at_corners(here, &feet, hull);
         let seen_past = |place: &Point2<f64>| {
             looks.clone().any(|(eye, range_m)| {
                 let seen = eye.inverse_transform(*place);
@@ -248,9 +254,7 @@ impl Near {
             }
         }
         for foot in feet {
-            let is_near =
-                |end: &&End| end.side == foot.side && (end.place - foot.place).norm() <= WALL_WITHIN_M;
-            let near: Vec<Point2<f64>> = self.ends.iter().filter(is_near).map(|end| end.place).collect();
+            let near: Vec<Point2<f64>> = self.ends_near(foot).collect();
             let Some((middle, along)) = line_through(foot.place, &near) else { continue };
             // Towards the robot.
             let across = Vector2::new(-along.y, along.x);
@@ -264,6 +268,32 @@ impl Near {
                 self.assumed.push((foot.seen, begin + along * (sign * WALL_STEP_M * f64::from(step))));
             }
         }
+    }
+}
+
+impl Near {
+    /// Between the sensors at a side and those in front nobody looks: a thing that comes into view beside the robot may already be at its corner. So
+    /// that corner comes no nearer to where it may be, until the thing is known for a wall, or seen past.
+    fn assume_at_corners(&mut self, here: Pose2, feet: &[End], hull: &Hull) {
+        for foot in feet.iter().filter(|foot| foot.side != 0) {
+            let range_m = (foot.place - foot.eye).norm();
+            let near: Vec<Point2<f64>> = self.ends_near(foot).collect();
+            if range_m > BESIDE_M || line_through(foot.place, &near).is_some() {
+                continue;
+            }
+            let off_m = (CORNER_SHARE * range_m).max(CORNER_LEAST_M);
+            let corner_x_m =
+                if here.inverse_transform(foot.eye).x > 0.0 { hull.front_m } else { -hull.rear_m };
+            let corner = Point2::new(corner_x_m, f64::from(foot.side) * (hull.side_m + off_m));
+            self.assumed.push((foot.seen, here.transform(corner)));
+        }
+    }
+
+    /// Where else readings out of the same side have ended near this one.
+    fn ends_near(&self, foot: &End) -> impl Iterator<Item = Point2<f64>> + '_ {
+        let (side, place) = (foot.side, foot.place);
+        let is_near = move |end: &&End| end.side == side && (end.place - place).norm() <= WALL_WITHIN_M;
+        self.ends.iter().filter(is_near).map(|end| end.place)
     }
 }
 

@@ -21,6 +21,7 @@ pub enum Sensor {
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
     /// World file whose walls count as near while the pose is known; empty for none. The signal does not depend on it.
+    #[schemars(extend("format" = "path"))]
     pub world: String,
     /// Which sensor is watched: "tof" or "laser".
     pub sensor: Sensor,

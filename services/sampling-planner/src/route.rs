@@ -141,7 +141,10 @@ impl Router {
 
 /// Length of a chain of waypoints.
 pub fn length_m(waypoints: &[Waypoint]) -> f64 {
-    waypoints.windows(2).map(|ends| (ends[1].x_m - ends[0].x_m).hypot(ends[1].y_m - ends[0].y_m)).sum()
+    let pieces =
+        waypoints.windows(2).map(|ends| (ends[1].x_m - ends[0].x_m).hypot(ends[1].y_m - ends[0].y_m));
+    // The sum of nothing would be -0.
+    pieces.fold(0.0, |sum, piece| sum + piece)
 }
 
 /// Where the way begins and ends, as free places that may be connected, or why there is none.

@@ -115,6 +115,30 @@ fn back_it_goes_only_over_ground_that_it_has_just_covered() {
 }
 
 #[test]
+fn who_was_pushed_back_may_go_on() {
+    let mut robot = Robot::driving();
+    for _ in 0..100 {
+        robot.step(go(), WheelSpeeds::ZERO);
+    }
+    // Farther than it remembers.
+    let begin_m = robot.pose.x_m - 1.5;
+    while robot.pose.x_m > begin_m {
+        robot.pose.x_m -= 0.02;
+        robot.travel.left_m -= 0.02;
+        robot.travel.right_m -= 0.02;
+        robot.step(go(), WheelSpeeds::ZERO);
+    }
+    for _ in 0..50 {
+        robot.step(go(), wish(-0.3, -0.3));
+    }
+    assert!(robot.pose.x_m > begin_m - 0.05, "nobody knows what is behind: {:?}", robot.pose);
+    for _ in 0..50 {
+        robot.step(go(), wish(0.3, 0.3));
+    }
+    assert!(robot.pose.x_m > begin_m + 0.1, "{:?}", robot.pose);
+}
+
+#[test]
 fn a_curve_is_a_way_back_as_it_was_a_way_there() {
     let mut robot = Robot::new(Params::default());
     // Slowly, so that both wheels come to rest at once, nearly.

@@ -64,8 +64,12 @@ impl Use {
         let mut last = [f64::NAN; KINDS];
         let mut steps: [Vec<f64>; KINDS] = Default::default();
         let mut found = Self::default();
+        let mut begun = false;
         for &(_, kind, stamps) in lines {
             let now = stamp(stamps);
+            if is_missing(now, &mut begun) {
+                continue;
+            }
             let step_s = now - last[kind];
             if !last[kind].is_nan() || now.is_nan() {
                 found.steps += 1;
@@ -91,6 +95,13 @@ impl Use {
     fn as_order(&self, period_s: f64) -> Times {
         Times::Order { forward: self.forward, steps: self.steps, period_s }
     }
+}
+
+/// Whether a stamp is none: programs that put lines into a log afterwards, as those that correct its poses do, stamp them with zero. A log may
+/// begin at zero.
+fn is_missing(stamp: f64, begun: &mut bool) -> bool {
+    *begun |= stamp > 0.0;
+    *begun && stamp == 0.0
 }
 
 /// The play as it goes on.
@@ -121,17 +132,18 @@ impl Play {
 
     fn run(mut self, lines: &[Stamped], stamp: impl Fn(Stamps) -> f64, log: &mut Log) -> Vec<f64> {
         let mut times = Vec::with_capacity(lines.len());
+        let mut begun = false;
         for (index, &(line, kind, stamps)) in lines.iter().enumerate() {
             let now = stamp(stamps);
             // A line without a usable stamp comes with the line before.
-            if now.is_nan() {
+            if is_missing(now, &mut begun) || now.is_nan() {
                 times.push(self.newest_s.unwrap_or(0.0));
                 continue;
             }
             // A clock that was set stays so; a single stamp that is far off was garbled.
             let stays = || {
                 let more = lines[index + 1..].iter().filter(|line| line.1 == kind);
-                let next = more.map(|line| stamp(line.2)).find(|next| !next.is_nan());
+                let next = more.map(|line| stamp(line.2)).find(|next| !next.is_nan() && *next != 0.0);
                 next.is_none_or(|next| (-DISORDER_S..LONGEST_STEP_S).contains(&(next - now)))
             };
             let at_s = self.advance(kind, now, stays, |fault| log.note(line, fault)).max(0.0);
