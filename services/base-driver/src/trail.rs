@@ -11,6 +11,8 @@ const APART_RAD: f64 = 0.02;
 const POSES_MAX: usize = 96;
 /// The hull may lie so far beside the ground that it has covered: less than what the odometry errs by on the way.
 const BESIDE_M: f64 = 0.01;
+/// And so far beside its sides, where the side sensors have looked when it passed: what they saw is known, and kept off from.
+const ASIDE_M: f64 = 0.06;
 /// Points along the hull's rear edge and rear sides that are looked at.
 const ALONG_REAR: i32 = 8;
 const ALONG_SIDE: i32 = 3;
@@ -86,6 +88,7 @@ impl Trail {
     }
 
     fn covers(&self, hull: &Hull, place: Pose2) -> bool {
+        let covered = Hull { side_m: hull.side_m + ASIDE_M, ..*hull };
         let share = |index: i32, of: i32| f64::from(index) / f64::from(of);
         let rear = (0..=ALONG_REAR)
             .map(|index| Point2::new(-hull.rear_m, hull.side_m * (2.0 * share(index, ALONG_REAR) - 1.0)));
@@ -95,7 +98,7 @@ impl Trail {
         });
         rear.chain(sides).all(|point| {
             let point = place.transform(point);
-            self.poses.iter().any(|pose| hull.distance_m(*pose, point) <= BESIDE_M)
+            self.poses.iter().any(|pose| covered.distance_m(*pose, point) <= BESIDE_M)
         })
     }
 }
