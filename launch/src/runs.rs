@@ -104,7 +104,8 @@ impl Record {
             command: std::env::args().collect(),
             seed,
             mode: if is_lockstep { "lockstep" } else { "live" }.to_owned(),
-            began_unix_s: unix_s(),
+            // To the millisecond: more digits do not survive as text in every case.
+            began_unix_s: (unix_s() * 1e3).round() / 1e3,
             launcher_pid: std::process::id(),
             end: None,
         }
