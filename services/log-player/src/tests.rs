@@ -315,7 +315,10 @@ fn the_committed_drive_is_whole() {
 #[test]
 fn recordings_of_carmen_are_whole() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/laser_carmen/");
-    for (name, scans) in [("intel", 910), ("freiburg-079", 4791), ("csail", 406), ("belgioioso", 395)] {
+    // 47 lines of the first are stamped with what memory held: a jump away and one back for each.
+    for (name, scans, jumps) in
+        [("intel", 910, 94), ("freiburg-079", 4791, 0), ("csail", 406, 0), ("belgioioso", 395, 0)]
+    {
         let file = format!("{folder}{name}-corrected.log.gz");
         if !std::path::Path::new(&file).exists() {
             println!("skipped: {file} is not there");
@@ -324,7 +327,7 @@ fn recordings_of_carmen_are_whole() {
         let log = load(&Params { file, format: Format::Carmen, period_s: 0.1, ..Params::default() }).unwrap();
         let seen = log.entries.iter().filter(|one| matches!(one.record, Record::Scan { .. })).count();
         println!("{name}: {} entries, {seen} scans, {:?}", log.entries.len(), log.problems.first());
-        assert_eq!((seen, log.problem_count), (scans, 0), "{name}: {:?}", log.problems);
+        assert_eq!((seen, log.problem_count), (scans, jumps), "{name}: {:?}", log.problems);
         assert!(log.entries.windows(2).all(|pair| pair[0].at_s <= pair[1].at_s));
     }
 }

@@ -19,6 +19,8 @@ const KINDS: usize = 3;
 const LONGEST_STEP_S: f64 = 60.0;
 /// A longer silence is none: the clock was set.
 const LONGEST_PAUSE_S: f64 = 86_400.0;
+/// Stamps up to here are none, unless the log begins with them.
+const NONE_S: f64 = 1e-6;
 /// Lines may be written in another order than they were made, by so much.
 const DISORDER_S: f64 = 1.0;
 
@@ -97,11 +99,11 @@ impl Use {
     }
 }
 
-/// Whether a stamp is none: programs that put lines into a log afterwards, as those that correct its poses do, stamp them with zero. A log may
-/// begin at zero.
+/// Whether a stamp is none: programs that put lines into a log afterwards, as those that correct its poses do, stamp them with zero, or with
+/// what memory held, which as a number is next to it. A log may begin at zero.
 fn is_missing(stamp: f64, begun: &mut bool) -> bool {
-    *begun |= stamp > 0.0;
-    *begun && stamp == 0.0
+    *begun |= stamp > NONE_S;
+    *begun && stamp.abs() <= NONE_S
 }
 
 /// The play as it goes on.
@@ -143,7 +145,7 @@ impl Play {
             // A clock that was set stays so; a single stamp that is far off was garbled.
             let stays = || {
                 let more = lines[index + 1..].iter().filter(|line| line.1 == kind);
-                let next = more.map(|line| stamp(line.2)).find(|next| !next.is_nan() && *next != 0.0);
+                let next = more.map(|line| stamp(line.2)).find(|next| !next.is_nan() && next.abs() > NONE_S);
                 next.is_none_or(|next| (-DISORDER_S..LONGEST_STEP_S).contains(&(next - now)))
             };
             let at_s = self.advance(kind, now, stays, |fault| log.note(line, fault)).max(0.0);
