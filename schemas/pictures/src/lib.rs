@@ -1,6 +1,6 @@
 //! Drawings as SVG that say what they show. A [`Sheet`] has a title and one or more [`Plan`]s to scale, each
-//! with axes in metres, a scale bar and a legend; a chart of another kind is drawn on a [`canvas`] with the
-//! same [`ticks`], [`legend`] and colours. [`lacks`] says what a drawing leaves its reader to guess.
+//! with axes in metres, a scale bar and a legend; a chart of another kind is drawn on a `canvas` with the
+//! same [`ticks`], `legend` and colours. [`lacks`] says what a drawing leaves its reader to guess.
 
 mod canvas;
 mod lacks;

@@ -4,12 +4,12 @@
 //!
 //! # Whatever a controller asks
 //! - **Ahead** no corner of the hull is faster than the guard's front radius allows: from the age that readings may have, the deadlines and
-//!   the motors' deceleration follows a speed from which the robot stops within it ([`speed`]).
+//!   the motors' deceleration follows a speed from which the robot stops within it (`speed`).
 //! - **Around** the hull moves only where it can stop before it comes too near to anything that the guard sees or has just seen
-//!   ([`stopping`]); what leads there is done as slowly as it takes, or not at all.
+//!   (`stopping`); what leads there is done as slowly as it takes, or not at all.
 //! - **Back**, where no sensor looks, it goes only over ground that the hull has just covered, and slowly, as somebody may have stepped
-//!   there ([`trail`]). That is also the way out when the guard says STOP for something in front.
-//! - A robot whose sensor looks **ahead only** turns and drives as far as was ordered by who has looked around, and no farther ([`orders`]).
+//!   there (`trail`). That is also the way out when the guard says STOP for something in front.
+//! - A robot whose sensor looks **ahead only** turns and drives as far as was ordered by who has looked around, and no farther (`orders`).
 //! - It **begins** with what the motors do: after a pause, or as a successor, it gains speed from what the encoders show.
 //! - Encoders that jump, or do not show what the wheels are told, are a fault: the wheels rest.
 

@@ -23,7 +23,7 @@
 //!
 //! # What is told beside the signal
 //! The radii, so that `base-driver` holds the robot to a speed from which it stops within them, and the points that are known to be near the
-//! hull ([`near`]): it moves the hull only where it can stop before it touches one.
+//! hull (`near`): it moves the hull only where it can stop before it touches one.
 
 mod eyes;
 mod laser;
