@@ -259,10 +259,18 @@ impl Supervisor {
 
     /// Descriptors that become readable when a service dies.
     pub(crate) fn descriptors(&self) -> impl Iterator<Item = &OwnedFd> {
-        let services = self.services.iter().filter_map(|service| service.process.as_ref());
-        let newcomers = self.services.iter().filter_map(Supervised::newcomer_process);
-        let leaving = self.leaving.iter().map(|(process, _)| process);
-        services.chain(newcomers).chain(leaving).map(|process| &process.pidfd)
+        self.processes().map(|process| &process.pidfd)
+    }
+
+    /// The processes that play a role, or are to.
+    fn players(&self) -> impl Iterator<Item = &Process> {
+        let playing = self.services.iter().filter_map(|service| service.process.as_ref());
+        playing.chain(self.services.iter().filter_map(Supervised::newcomer_process))
+    }
+
+    /// Those, and the ones that were asked to leave.
+    fn processes(&self) -> impl Iterator<Item = &Process> {
+        self.players().chain(self.leaving.iter().map(|(process, _)| process))
     }
 
     /// Whether every service has joined the board.
@@ -298,16 +306,10 @@ impl Supervisor {
         if self.lost.is_some() {
             return;
         }
-        for damage in self.host.repair(&self.living()) {
+        let living: Vec<(u32, u32)> = self.players().map(|process| (process.slot, process.pid())).collect();
+        for damage in self.host.repair(&living) {
             self.note("", damage, true);
         }
-    }
-
-    /// The places of the services that live, newcomers included, with their processes.
-    fn living(&self) -> Vec<(u32, u32)> {
-        let playing = self.services.iter().filter_map(|service| service.process.as_ref());
-        let newcomers = self.services.iter().filter_map(Supervised::newcomer_process);
-        playing.chain(newcomers).map(|process| (process.slot, process.pid())).collect()
     }
 
     /// Ends a service and starts it again; `false` when there is none of that name.
@@ -664,11 +666,7 @@ impl Supervisor {
         if !self.strays.are_expected() {
             return;
         }
-        let processes = self.services.iter().filter_map(Supervised::pid);
-        let newcomers =
-            self.services.iter().filter_map(|service| service.newcomer_process().map(Process::pid));
-        let leaving = self.leaving.iter().map(|(process, _)| process.pid());
-        let ours: Vec<u32> = processes.chain(newcomers).chain(leaving).chain(self.cleaner.pid()).collect();
+        let ours: Vec<u32> = self.processes().map(Process::pid).chain(self.cleaner.pid()).collect();
         self.strays.end_all(self.host.place().name(), &ours);
     }
 

@@ -41,12 +41,9 @@ fn check_touches_nothing(graph: &str, decent: &str, begins_s: f64) {
         let truth = graph.collect("world/truth");
         let (_, last) = truth.last().unwrap();
         assert_eq!(last["contacts"], 0, "{mode}: {last}");
-        let moved = |from: usize| {
-            let place = |at: usize| ["x_m", "y_m"].map(|key| truth[at].1[key].as_f64().unwrap());
-            let ([x_m, y_m], [to_x_m, to_y_m]) = (place(from), place(truth.len() - 1));
-            (to_x_m - x_m).hypot(to_y_m - y_m)
-        };
-        driven += u32::from(moved(0) > 0.05);
+        let place = |truth: &Value| ["x_m", "y_m"].map(|key| truth[key].as_f64().unwrap());
+        let ([x_m, y_m], [to_x_m, to_y_m]) = (place(&truth[0].1), place(last));
+        driven += u32::from((to_x_m - x_m).hypot(to_y_m - y_m) > 0.05);
     }
     // Some look around for longer before they set out.
     assert!(driven > 6, "only {driven} have driven");
@@ -69,11 +66,14 @@ fn swap(graph: &Running, arguments: &[&str]) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
 }
 
+fn status(graph: &Running) -> Value {
+    let output = Command::new(launcher()).args(["ps", "--json", "--board", graph.board()]).output().unwrap();
+    serde_json::from_slice(&output.stdout).unwrap_or_default()
+}
+
 /// What plays the role now.
 fn player(graph: &Running) -> String {
-    let output =
-        Command::new(launcher()).args(["ps", "--json", "--board", graph.board()]).output().unwrap().stdout;
-    let status: Value = serde_json::from_slice(&output).unwrap_or_default();
+    let status = status(graph);
     let services = status["services"].as_array().cloned().unwrap_or_default();
     let service = services.into_iter().find(|service| service["role"] == "controller");
     service.map_or(String::new(), |service| service["run"].as_str().unwrap_or_default().to_owned())
@@ -154,9 +154,7 @@ fn its_words_do_not_fill_the_disk_and_its_memory_is_bounded() {
     wait_for_player(&graph, "hostile-controller");
     clock::sleep(Duration::from_secs(3));
     assert_eq!(contacts(&graph), 0);
-    let output = Command::new(launcher()).args(["ps", "--json", "--board", graph.board()]).output().unwrap();
-    let status: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let folder = std::path::PathBuf::from(status["logs"].as_str().unwrap());
+    let folder = std::path::PathBuf::from(status(&graph)["logs"].as_str().unwrap());
     let bytes: u64 =
         std::fs::read_dir(folder).unwrap().flatten().map(|file| file.metadata().unwrap().len()).sum();
     assert!(bytes < 8 << 20, "{bytes} bytes of logs");
