@@ -24,7 +24,8 @@ impl Hull {
     pub fn distance_to_m(&self, point: Point2<f64>) -> f64 {
         let ahead_m = (point.x - self.front_m).max(-self.rear_m - point.x).max(0.0);
         let aside_m = (point.y.abs() - self.side_m).max(0.0);
-        ahead_m.hypot(aside_m)
+        // Most points lie beside one edge.
+        if ahead_m == 0.0 { aside_m } else { ahead_m.hypot(aside_m) }
     }
 
     /// From the hull of a robot at `pose` to a point of the frame that `pose` is given in, in metres; 0 inside.

@@ -26,7 +26,7 @@ pub use hull::Hull;
 pub use map_file::{MapError, MapHeader, MapImage, MapMode, MapProblem, Pixel};
 pub use nalgebra::{Point2, Vector2};
 pub use polygon::{Polygon, PolygonError, Shape, is_simple};
-pub use pose::Pose2;
+pub use pose::{Frame, Pose2};
 pub use scene::{BodyId, Clearance, Hit, Ray, Scene, Surface};
 pub use segment::Segment;
 pub use walls::{WallHit, Walls};

@@ -56,20 +56,20 @@ impl Pose2 {
         self.inverse().compose(other)
     }
 
+    /// This body's frame, for many points at a time.
+    pub fn frame(self) -> Frame {
+        let (sine, cosine) = self.heading_rad.sin_cos();
+        Frame { origin: self.position(), sine, cosine }
+    }
+
     /// A point of this body's frame in the frame of this pose.
     pub fn transform(self, point: Point2<f64>) -> Point2<f64> {
-        let (sine, cosine) = self.heading_rad.sin_cos();
-        Point2::new(
-            self.x_m + cosine * point.x - sine * point.y,
-            self.y_m + sine * point.x + cosine * point.y,
-        )
+        self.frame().transform(point)
     }
 
     /// A point of the frame as seen from this body.
     pub fn inverse_transform(self, point: Point2<f64>) -> Point2<f64> {
-        let (sine, cosine) = self.heading_rad.sin_cos();
-        let offset = Vector2::new(point.x - self.x_m, point.y - self.y_m);
-        Point2::new(cosine * offset.x + sine * offset.y, cosine * offset.y - sine * offset.x)
+        self.frame().inverse_transform(point)
     }
 
     /// Where a differential drive stands after an arc of `distance_m` along its path while its heading changes by `turn_rad`
@@ -94,5 +94,30 @@ impl Pose2 {
     /// Direction from this place to `point` relative to this heading, in (-π, π].
     pub fn bearing_rad(self, point: Point2<f64>) -> f64 {
         angle::wrap((point.y - self.y_m).atan2(point.x - self.x_m) - self.heading_rad)
+    }
+}
+/// A body's frame with sine and cosine of its heading worked out once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    origin: Point2<f64>,
+    sine: f64,
+    cosine: f64,
+}
+
+impl Frame {
+    /// A point of the body's frame in the frame in which its pose is given.
+    pub fn transform(&self, point: Point2<f64>) -> Point2<f64> {
+        let (sine, cosine) = (self.sine, self.cosine);
+        Point2::new(
+            self.origin.x + cosine * point.x - sine * point.y,
+            self.origin.y + sine * point.x + cosine * point.y,
+        )
+    }
+
+    /// A point of the frame in which the body's pose is given, as seen from the body.
+    pub fn inverse_transform(&self, point: Point2<f64>) -> Point2<f64> {
+        let (sine, cosine) = (self.sine, self.cosine);
+        let offset: Vector2<f64> = point - self.origin;
+        Point2::new(cosine * offset.x + sine * offset.y, cosine * offset.y - sine * offset.x)
     }
 }

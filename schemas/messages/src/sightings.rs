@@ -68,9 +68,10 @@ impl Sightings {
 
     /// Forgets what is old, far away, or not farther from the robot's hull than `beyond_m`: where the robot stands, nothing else does.
     pub fn forget(&mut self, now: Time, here: Pose2, hull: &Hull, beyond_m: f64) {
+        let frame = here.frame();
         self.points.retain(|point| {
             (point.place - here.position()).norm() <= KEPT_WITHIN_M
-                && hull.distance_m(here, point.place) > beyond_m
+                && hull.distance_to_m(frame.inverse_transform(point.place)) > beyond_m
                 && now.seconds_since(point.seen) <= KEPT_S
         });
     }
@@ -79,8 +80,9 @@ impl Sightings {
     /// view is that is trusted to see everything: half of its width for each metre.
     pub fn see_through(&mut self, eye: Pose2, range_m: f64, slope: f64) {
         let passed_m = range_m.min(SEEN_WITHIN_M) - PASSED_M;
+        let frame = eye.frame();
         self.points.retain_mut(|point| {
-            let seen = eye.inverse_transform(point.place);
+            let seen = frame.inverse_transform(point.place);
             if seen.x > 0.0 && seen.x < passed_m && seen.y.abs() <= slope * seen.x + SLACK_M {
                 point.weight = point.weight.saturating_sub(1);
             }

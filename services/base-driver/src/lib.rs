@@ -270,7 +270,16 @@ impl BaseDriver {
             DriveReasonName::Escaping => params.reverse_speed_mps,
             _ => speed::ahead_mps(params, clearance, way_m).ok_or(DriveReasonName::NothingGuarded)?,
         };
-        let corner_mps = if params.room == Room::Ordered { f64::INFINITY } else { ahead_mps };
+        let corner_mps = match params.room {
+            Room::Ordered => f64::INFINITY,
+            Room::Seen | Room::Unchecked => ahead_mps.min(speed::swinging_mps(
+                wanted.speeds,
+                &self.hull,
+                params.wheel_track_m,
+                params.reaction_s(clearance.max_age_ms),
+                params.deceleration_m_per_s2,
+            )),
+        };
         let limits = [corner_mps, ahead_mps, params.reverse_speed_mps, params.top_speed_mps];
         Ok(speed::slowed(wanted.speeds, &self.hull, params.wheel_track_m, limits))
     }

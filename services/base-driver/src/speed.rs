@@ -4,6 +4,9 @@ use crate::Params;
 use geometry::Hull;
 use messages::{Clearance, WheelSpeeds};
 
+/// So near to a corner of the hull may be what no sensor has seen.
+const SWUNG_OUT_M: f64 = 0.03;
+
 /// The speed from which a robot that first goes on for `reaction_s` and then loses `deceleration` stops within `way_m`:
 /// v·t + v²/2a = way (companions 2.5).
 pub(crate) fn fastest_mps(way_m: f64, reaction_s: f64, deceleration_m_per_s2: f64) -> f64 {
@@ -29,6 +32,28 @@ pub(crate) fn ahead_mps(params: &Params, clearance: &Clearance, way_m: f32) -> O
     let reaction_s = params.reaction_s(clearance.max_age_ms);
     let speed_mps = fastest_mps(f64::from(way_m).min(1e6), reaction_s, params.deceleration_m_per_s2);
     (way_m > 0.0 && clearance.front_radius_m > 0.0 && speed_mps > 0.0).then_some(speed_mps)
+}
+
+/// How fast a corner of the hull's front may be in such a motion: before the robot stands, it swings out by no more than `SWUNG_OUT_M`.
+/// The sensors in front look ahead, and those at the side see a thing only when that corner is beside it already.
+pub(crate) fn swinging_mps(
+    wanted: WheelSpeeds,
+    hull: &Hull,
+    track_m: f64,
+    reaction_s: f64,
+    deceleration_m_per_s2: f64,
+) -> f64 {
+    let forward_mps = 0.5 * (wanted.left_mps + wanted.right_mps);
+    let turn_rad_per_s = (wanted.right_mps - wanted.left_mps) / track_m;
+    // The corner on the inner side of the curve, which goes more to the side than any other.
+    let aside_mps = turn_rad_per_s.abs() * hull.front_m;
+    let along_mps = forward_mps - turn_rad_per_s.abs() * hull.side_m;
+    let share = aside_mps / aside_mps.hypot(along_mps);
+    if share > 0.0 {
+        fastest_mps((SWUNG_OUT_M / share).min(1e6), reaction_s, deceleration_m_per_s2)
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// The same motion, slower: no corner of the hull faster than `corner_mps`, the robot no faster ahead than `ahead_mps` and back than

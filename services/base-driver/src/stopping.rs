@@ -1,7 +1,7 @@
 //! Where the hull goes until it stands.
 
 use crate::Params;
-use geometry::{Hull, Point2, Pose2};
+use geometry::{Frame, Hull, Point2, Pose2};
 use messages::WheelSpeeds;
 
 /// The motion is followed in steps of this length while a command holds, and of that length while the wheels come to rest.
@@ -54,8 +54,16 @@ pub(crate) fn keeps_off(hull: &Hull, poses: &[Pose2], points: &[Point2<f64>], ma
     let nearest_m = present.filter(|distance_m| *distance_m > 0.0).fold(f64::INFINITY, f64::min);
     let less_noise_m = |now_m: f64| if now_m > NEARER_SHARE * margin_m { now_m - NOISE_M } else { now_m };
     let kept_m = less_noise_m(nearest_m).clamp(NEAREST_SHARE * margin_m, margin_m);
+    let frames: Vec<Frame> = poses.iter().map(|pose| pose.frame()).collect();
+    // No corner comes farther than this from where it is now.
+    let reach = |pose: &Pose2| pose.position().coords.norm() + hull.radius_m() * pose.heading_rad.abs();
+    let reach_m = poses.iter().map(reach).fold(0.0, f64::max);
     points.iter().all(|point| {
-        let least_m = kept_m.min(less_noise_m(hull.distance_to_m(*point)));
-        poses.iter().all(|pose| hull.distance_m(*pose, *point) >= least_m - 1e-9)
+        let now_m = hull.distance_to_m(*point);
+        let least_m = kept_m.min(less_noise_m(now_m));
+        now_m - reach_m >= least_m
+            || frames
+                .iter()
+                .all(|frame| hull.distance_to_m(frame.inverse_transform(*point)) >= least_m - 1e-9)
     })
 }

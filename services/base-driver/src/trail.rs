@@ -96,9 +96,10 @@ impl Trail {
             let x_m = -hull.rear_m * share(index, ALONG_SIDE);
             [Point2::new(x_m, -hull.side_m), Point2::new(x_m, hull.side_m)]
         });
+        let place = place.frame();
         rear.chain(sides).all(|point| {
             let point = place.transform(point);
-            self.poses.iter().any(|pose| covered.distance_m(*pose, point) <= BESIDE_M)
+            self.poses.iter().rev().any(|pose| covered.distance_m(*pose, point) <= BESIDE_M)
         })
     }
 }

@@ -6,7 +6,7 @@ use crate::{
     laser::{Beam, Scan},
     memory::Motion,
 };
-use geometry::{Hull, Point2, Pose2, Segment, Vector2, World, WorldError, angle};
+use geometry::{Frame, Hull, Point2, Pose2, Segment, Vector2, World, WorldError, angle};
 use messages::{KeptSighting, NearPoint, PoseEstimate, SEEN_WITHIN_M, Sightings, TOF_SLOPE, Time, TofRanges};
 use std::f64::consts::FRAC_PI_2;
 
@@ -47,9 +47,10 @@ const ASSUMED_NEARER_M: f64 = 0.015;
 const ASSUMED_S: f64 = 1.0;
 /// What is assumed does not reach nearer to the hull than this: the robot stands there.
 const ASSUMED_OFF_M: f64 = 0.02;
-/// What is seen beside the robot, nearer than this, and is no wall may reach as far as the corner of the hull next to the sensor, where no
-/// sensor looks, and there be nearer still by this share, but not nearer than so much.
+/// What is seen beside the robot, or in front by an outermost sensor, nearer than this, and is no wall may reach as far as the corner of the
+/// hull next to the sensor, where no sensor looks, and there be nearer still by this share, but not nearer than so much.
 const BESIDE_M: f64 = 0.25;
+const AHEAD_M: f64 = 0.35;
 const CORNER_SHARE: f64 = 0.5;
 const CORNER_LEAST_M: f64 = 0.03;
 /// Walls of the map count while the pose is known so well (one standard deviation).
@@ -143,17 +144,18 @@ impl Near {
                 self.rims.add(now, eye.transform(Point2::new(range_m, slope * range_m)));
             }
         }
-        self.assume(&feet);
-        self.assume_at_corners(here, &feet, hull);
+        self.assume(here, &feet, hull);
+        let frame = here.frame();
+        let eyes: Vec<(Frame, f64)> = looks.map(|(eye, range_m)| (eye.frame(), range_m)).collect();
         let seen_past = |place: &Point2<f64>| {
-            looks.clone().any(|(eye, range_m)| {
+            eyes.iter().any(|(eye, range_m)| {
                 let seen = eye.inverse_transform(*place);
                 seen.x > 0.0 && seen.x < range_m - ENDS_APART_M && seen.y.abs() <= TOF_SLOPE * seen.x
             })
         };
         self.assumed.retain(|(seen, place)| {
             now.seconds_since(*seen) <= ASSUMED_S
-                && hull.distance_m(here, *place) > ASSUMED_OFF_M
+                && hull.distance_to_m(frame.inverse_transform(*place)) > ASSUMED_OFF_M
                 && !seen_past(place)
         });
     }
@@ -203,7 +205,8 @@ impl Near {
         let seen = self.sightings.iter().chain(self.rims.iter()).map(|sighting| sighting.place);
         let places =
             seen.chain(self.assumed.iter().map(|(_, place)| *place)).chain(self.walls.iter().copied());
-        let local = places.map(|place| here.inverse_transform(place));
+        let frame = here.frame();
+        let local = places.map(|place| frame.inverse_transform(place));
         let mut near: Vec<(f64, Point2<f64>)> = local
             .map(|place| (hull.distance_to_m(place), place))
             .filter(|(distance_m, _)| (1e-9..TOLD_WITHIN_M).contains(distance_m))
@@ -212,9 +215,14 @@ impl Near {
         for (_, place) in near {
             let point = NearPoint { x_m: place.x as f32, y_m: place.y as f32 };
             // The nearest first: what lies beside it tells no more.
-            let is_news =
-                |told: &NearPoint| (told.x_m - point.x_m).hypot(told.y_m - point.y_m) >= TOLD_APART_M;
-            if self.points.len() < TOLD_MAX && self.points.iter().all(is_news) {
+            let is_news = |told: &NearPoint| {
+                let (x_m, y_m) = (told.x_m - point.x_m, told.y_m - point.y_m);
+                x_m * x_m + y_m * y_m >= TOLD_APART_M * TOLD_APART_M
+            };
+            if self.points.len() == TOLD_MAX {
+                break;
+            }
+            if self.points.iter().all(is_news) {
                 self.points.push(point);
             }
         }
@@ -232,12 +240,13 @@ impl Near {
         }
         self.sightings.forget(now, here, hull, 0.0);
         self.rims.forget(now, here, hull, 0.0);
-        self.ends.retain(|end| hull.distance_m(here, end.place) < SEEN_WITHIN_M);
+        let frame = here.frame();
+        self.ends.retain(|end| hull.distance_to_m(frame.inverse_transform(end.place)) < SEEN_WITHIN_M);
         Some(here)
     }
 
     /// Walls go on beyond the ends of what was seen of them: a corner of the hull comes there before a sensor does.
-    fn assume(&mut self, feet: &[End]) {
+    fn assume(&mut self, here: Pose2, feet: &[End], hull: &Hull) {
         for foot in feet {
             let is_known =
                 |end: &End| end.side == foot.side && (end.place - foot.place).norm() < ENDS_APART_M;
@@ -255,7 +264,10 @@ impl Near {
         }
         for foot in feet {
             let near: Vec<Point2<f64>> = self.ends_near(foot).collect();
-            let Some((middle, along)) = line_through(foot.place, &near) else { continue };
+            let Some((middle, along)) = line_through(foot.place, &near) else {
+                self.assume_at_corners(here, foot, hull);
+                continue;
+            };
             // Towards the robot.
             let across = Vector2::new(-along.y, along.x);
             let nearer = across * (ASSUMED_NEARER_M * across.dot(&(foot.eye - middle)).signum());
@@ -272,21 +284,23 @@ impl Near {
 }
 
 impl Near {
-    /// Between the sensors at a side and those in front nobody looks: a thing that comes into view beside the robot may already be at its corner. So
-    /// that corner comes no nearer to where it may be, until the thing is known for a wall, or seen past.
-    fn assume_at_corners(&mut self, here: Pose2, feet: &[End], hull: &Hull) {
-        for foot in feet.iter().filter(|foot| foot.side != 0) {
-            let range_m = (foot.place - foot.eye).norm();
-            let near: Vec<Point2<f64>> = self.ends_near(foot).collect();
-            if range_m > BESIDE_M || line_through(foot.place, &near).is_some() {
-                continue;
+    /// Between the sensors at a side and those in front nobody looks: a thing that comes into view of one of them may already be at the corner
+    /// between them. So that corner comes no nearer to where it may be, until the thing is known for a wall, or seen past.
+    fn assume_at_corners(&mut self, here: Pose2, foot: &End, hull: &Hull) {
+        let range_m = (foot.place - foot.eye).norm();
+        let off_m = (CORNER_SHARE * range_m).max(CORNER_LEAST_M);
+        let eye = here.inverse_transform(foot.eye);
+        let corner = match foot.side {
+            0 if range_m <= AHEAD_M && eye.y.abs() > hull.side_m - OUTERMOST_M => {
+                Point2::new(hull.front_m + off_m, (hull.side_m + CORNER_LEAST_M).copysign(eye.y))
             }
-            let off_m = (CORNER_SHARE * range_m).max(CORNER_LEAST_M);
-            let corner_x_m =
-                if here.inverse_transform(foot.eye).x > 0.0 { hull.front_m } else { -hull.rear_m };
-            let corner = Point2::new(corner_x_m, f64::from(foot.side) * (hull.side_m + off_m));
-            self.assumed.push((foot.seen, here.transform(corner)));
-        }
+            side if side != 0 && range_m <= BESIDE_M => {
+                let x_m = if eye.x > 0.0 { hull.front_m } else { -hull.rear_m };
+                Point2::new(x_m, f64::from(side) * (hull.side_m + off_m))
+            }
+            _ => return,
+        };
+        self.assumed.push((foot.seen, here.transform(corner)));
     }
 
     /// Where else readings out of the same side have ended near this one.
