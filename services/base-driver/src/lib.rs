@@ -5,6 +5,7 @@
 //! # Whatever a controller asks
 //! - **Ahead** no corner of the hull is faster than the guard's front radius allows: from the age that readings may have, the deadlines and
 //!   the motors' deceleration follows a speed from which the robot stops within it (`speed`).
+//! - **Aside**, in a curve, a corner comes where no sensor looks: the narrower the curve, the slower the robot.
 //! - **Around** the hull moves only where it can stop before it comes too near to anything that the guard sees or has just seen
 //!   (`stopping`); what leads there is done as slowly as it takes, or not at all.
 //! - **Back**, where no sensor looks, it goes only over ground that the hull has just covered, and slowly, as somebody may have stepped
@@ -270,16 +271,15 @@ impl BaseDriver {
             DriveReasonName::Escaping => params.reverse_speed_mps,
             _ => speed::ahead_mps(params, clearance, way_m).ok_or(DriveReasonName::NothingGuarded)?,
         };
-        let corner_mps = match params.room {
-            Room::Ordered => f64::INFINITY,
-            Room::Seen | Room::Unchecked => ahead_mps.min(speed::swinging_mps(
-                wanted.speeds,
-                &self.hull,
-                params.wheel_track_m,
-                params.reaction_s(clearance.max_age_ms),
-                params.deceleration_m_per_s2,
-            )),
+        let corner_mps = if params.room == Room::Ordered { f64::INFINITY } else { ahead_mps };
+        let curving_mps = if params.room == Room::Ordered {
+            f64::INFINITY
+        } else {
+            let reaction_s = params.reaction_s(clearance.max_age_ms);
+            let (hull, track_m, loss) = (&self.hull, params.wheel_track_m, params.deceleration_m_per_s2);
+            speed::curving_mps(wanted.speeds, hull, track_m, reaction_s, loss)
         };
+        let ahead_mps = ahead_mps.min(curving_mps);
         let limits = [corner_mps, ahead_mps, params.reverse_speed_mps, params.top_speed_mps];
         Ok(speed::slowed(wanted.speeds, &self.hull, params.wheel_track_m, limits))
     }

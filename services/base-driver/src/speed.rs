@@ -5,7 +5,7 @@ use geometry::Hull;
 use messages::{Clearance, WheelSpeeds};
 
 /// So near to a corner of the hull may be what no sensor has seen.
-const SWUNG_OUT_M: f64 = 0.03;
+const ASIDE_M: f64 = 0.03;
 
 /// The speed from which a robot that first goes on for `reaction_s` and then loses `deceleration` stops within `way_m`:
 /// v·t + v²/2a = way (companions 2.5).
@@ -34,9 +34,10 @@ pub(crate) fn ahead_mps(params: &Params, clearance: &Clearance, way_m: f32) -> O
     (way_m > 0.0 && clearance.front_radius_m > 0.0 && speed_mps > 0.0).then_some(speed_mps)
 }
 
-/// How fast a corner of the hull's front may be in such a motion: before the robot stands, it swings out by no more than `SWUNG_OUT_M`.
-/// The sensors in front look ahead, and those at the side see a thing only when that corner is beside it already.
-pub(crate) fn swinging_mps(
+/// How fast the robot may be ahead in such a curve: before it stands, the corner of its front that goes aside has come aside by no more than
+/// `ASIDE_M`. The sensors in front look ahead, and those at the side see a thing only when that corner is beside it already. (A turn on the
+/// spot shows them nothing new, and need not be slower for that.)
+pub(crate) fn curving_mps(
     wanted: WheelSpeeds,
     hull: &Hull,
     track_m: f64,
@@ -45,12 +46,12 @@ pub(crate) fn swinging_mps(
 ) -> f64 {
     let forward_mps = 0.5 * (wanted.left_mps + wanted.right_mps);
     let turn_rad_per_s = (wanted.right_mps - wanted.left_mps) / track_m;
-    // The corner on the inner side of the curve, which goes more to the side than any other.
+    // The corner on the inner side of the curve.
     let aside_mps = turn_rad_per_s.abs() * hull.front_m;
     let along_mps = forward_mps - turn_rad_per_s.abs() * hull.side_m;
     let share = aside_mps / aside_mps.hypot(along_mps);
     if share > 0.0 {
-        fastest_mps((SWUNG_OUT_M / share).min(1e6), reaction_s, deceleration_m_per_s2)
+        fastest_mps((ASIDE_M / share).min(1e6), reaction_s, deceleration_m_per_s2)
     } else {
         f64::INFINITY
     }

@@ -26,7 +26,7 @@ const OFF_WALL_M: f64 = 0.12;
 const LONG_WALL_M: f64 = 1.0;
 /// A motion is tried for so long, in so many steps.
 const TRIED_S: f64 = 0.9;
-const TRIES: u32 = 6;
+const TRIES: usize = 6;
 /// What is too near already may come nearer by this, for noise.
 const NOISE_M: f64 = 0.001;
 /// A robot that moves less than this between two looks, in metres and radians, stands.
@@ -210,20 +210,22 @@ impl Surround {
 
     /// Whether, during the next moment, nothing seen comes nearer to the body than `margin_m`, or than it is already.
     fn is_clear(&self, here: Pose2, [left, right]: Wheels, margin_m: f64, params: &Params) -> bool {
-        let step_s = TRIED_S / f64::from(TRIES);
+        let step_s = TRIED_S / TRIES as f64;
         let (step_m, turn_rad) = (0.5 * (left + right) * step_s, (right - left) / params.track_m * step_s);
         let hull = params.hull();
         let points = self.points.iter().chain(self.assumed.iter());
-        let places = points.map(|point| point.place).chain(self.walls.iter().copied());
-        places.into_iter().all(|place| {
-            let now_m = hull.distance_m(here, place);
+        let mut places = points.map(|point| point.place).chain(self.walls.iter().copied());
+        let mut pose = here;
+        let way = [(); TRIES].map(|()| {
+            pose = pose.after_arc(step_m, turn_rad);
+            pose.frame()
+        });
+        let here = here.frame();
+        places.all(|place| {
+            let now_m = hull.distance_to_m(here.inverse_transform(place));
             let noise_m = if now_m > 0.5 * params.keep_away_m { NOISE_M } else { 0.0 };
             let least_m = margin_m.min(now_m - noise_m);
-            let mut pose = here;
-            (0..TRIES).all(|_| {
-                pose = pose.after_arc(step_m, turn_rad);
-                hull.distance_m(pose, place) >= least_m
-            })
+            way.iter().all(|frame| hull.distance_to_m(frame.inverse_transform(place)) >= least_m)
         })
     }
 }

@@ -102,6 +102,31 @@ fn a_wall_goes_on_where_the_corner_of_the_hull_comes_first() {
     }
 }
 
+/// Between the sensor and the corner nobody looks: what comes into view of it may reach to the corner.
+#[track_caller]
+fn check_at_corner(sensor: usize, range_m: f32, corner: [f64; 2], is_there: bool) {
+    let mut ranges = [FAR; TOF_COUNT];
+    ranges[sensor] = range_m;
+    let (_, points) = told(Params::default(), &[(Pose2::IDENTITY, frame(ranges))]);
+    check_told(&points, corner[0], corner[1], is_there);
+}
+
+#[test]
+fn what_comes_into_view_may_be_at_the_corner_already() {
+    check_at_corner(1, 0.2, [0.305, -0.355], true);
+    check_at_corner(6, 0.2, [0.305, 0.355], true);
+    check_at_corner(0, 0.2, [-0.305, -0.355], true);
+    check_at_corner(2, 0.3, [0.455, -0.285], true);
+    check_at_corner(5, 0.3, [0.455, 0.285], true);
+    // Right at the sensor.
+    check_at_corner(2, 0.05, [0.335, -0.285], true);
+    check_at_corner(1, 0.03, [0.305, -0.285], true);
+    // Farther away there is time; and the inner sensors have neighbours.
+    check_at_corner(1, 0.3, [0.305, -0.405], false);
+    check_at_corner(2, 0.4, [0.505, -0.285], false);
+    check_at_corner(3, 0.3, [0.455, -0.285], false);
+}
+
 #[test]
 fn a_box_beside_the_wall_is_no_wall_across_the_way() {
     // The nose is beside the box, the tail still beside the wall.
