@@ -16,6 +16,7 @@
 
 mod clock;
 mod lines;
+mod pieces;
 mod survey;
 
 use crate::log::{Entry, Fault, Log, MOST_RECORDS, Record, Remark};
@@ -69,6 +70,7 @@ pub(crate) fn read_as(text: &str, params: &Params) -> Log {
     }
     if let Some(laser) = laser {
         settle_poses(&mut moments, laser, &survey, &mut log);
+        pieces::settle(&mut moments, params.odometry, &mut log);
     }
     let stamps: Vec<_> =
         moments.iter().map(|moment| (moment.line, moment.what.kind(), moment.stamps)).collect();

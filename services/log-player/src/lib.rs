@@ -16,7 +16,7 @@ mod tests;
 pub use carmen::read as read_carmen;
 pub use load::{LoadError, check_files, load};
 pub use log::{Entry, Fault, Log, PROBLEM_LIMIT, Problem, Record, Remark, Times};
-pub use params::{AnchorPlace, Format, Laser, Params, ParamsError, Pose, Scans, Timing};
+pub use params::{AnchorPlace, Format, Laser, OdometryLines, Params, ParamsError, Pose, Scans, Timing};
 pub use steps::read as read_steps;
 
 use geometry::Pose2;

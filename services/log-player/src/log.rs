@@ -232,6 +232,24 @@ pub enum Remark {
         /// The first word of the lines.
         keyword: &'static str,
     },
+    /// The odometry begins anew at the pose of each scan, or nearly each.
+    #[error(
+        "after {repeats} of {scans} scans the odometry begins anew at the scan's pose: if those poses were corrected later, it knows the truth, and only `odometry = \"between-scans\"` plays what the robot's own wheels said"
+    )]
+    OdometryAtScans {
+        /// So often.
+        repeats: usize,
+        /// Of so many times.
+        scans: usize,
+    },
+    /// What of the odometry is left out.
+    #[error(
+        "of the odometry only the ways between two scans are played; {steps} steps to a scan's pose are left out"
+    )]
+    OdometryBetweenScans {
+        /// How many.
+        steps: usize,
+    },
     /// Lines that hold nothing to be played.
     #[error("{} hold nothing to be played", counted(.0))]
     Idle(Vec<(String, usize)>),

@@ -88,6 +88,19 @@ impl Scans {
     }
 }
 
+/// Which odometry of a CARMEN log is played.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OdometryLines {
+    /// As it is recorded.
+    #[default]
+    Recorded,
+    /// Only the pieces of way between two scans, one put to the other's end. In a log that was corrected later
+    /// the odometry after each scan begins anew at that scan's corrected pose: the step to there is no
+    /// odometry, but the truth.
+    BetweenScans,
+}
+
 /// What `log-player` can be told.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -111,6 +124,8 @@ pub struct Params {
     pub laser_fov_rad: f64,
     /// Which scans are played; in a CARMEN log the true pose of a scan goes with it.
     pub scans: Scans,
+    /// Which odometry of a CARMEN log is played.
+    pub odometry: OdometryLines,
     /// Publishes the true poses as `location/pose` too, in the place of a localiser: to make a map.
     pub truth_as_location: bool,
     /// How many times faster than it was recorded.
@@ -175,6 +190,7 @@ impl Default for Params {
             laser: Laser::Auto,
             laser_fov_rad: 0.0,
             scans: Scans::All,
+            odometry: OdometryLines::Recorded,
             truth_as_location: false,
             speed: 1.0,
             timing: Timing::Auto,

@@ -451,3 +451,47 @@ proptest::proptest! {
         }
     }
 }
+
+fn odometry(log: &Log) -> Vec<f64> {
+    let ways = log.entries.iter().filter_map(|entry| match entry.record {
+        Record::Odometry(pose) => Some(pose.x_m),
+        _ => None,
+    });
+    ways.collect()
+}
+
+/// Two metres driven, of which the wheels counted 0.8 m between one scan and the next, and the corrections put 0.2 m beside them.
+fn corrected() -> String {
+    let mut text = odom(0.0, 1.0) + &odom(0.4, 2.0);
+    for scan in 1..=5_u32 {
+        let (at_m, at_s) = (f64::from(scan), f64::from(10 * scan));
+        text += &flaser(at_m, at_s);
+        text += &odom(at_m, at_s + 1.0);
+        text += &odom(at_m + 0.5, at_s + 2.0);
+        text += &odom(at_m + 0.8, at_s + 3.0);
+    }
+    text
+}
+
+#[test]
+fn odometry_that_knows_the_truth_is_told_and_can_be_left_out() {
+    let recorded = read(&corrected());
+    says(&recorded, "after 5 of 5 scans the odometry begins anew at the scan's pose");
+    assert_eq!(odometry(&recorded)[2..5], [1.0, 1.5, 1.8]);
+
+    let params = Params { odometry: OdometryLines::BetweenScans, ..Params::default() };
+    let honest = crate::carmen::read_as(&corrected(), &params);
+    says(&honest, "5 steps to a scan's pose are left out");
+    let wheels = odometry(&honest);
+    let expected = [0.0, 0.4, 0.4, 0.9, 1.2, 1.2, 1.7, 2.0];
+    assert!(
+        wheels.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-12),
+        "{wheels:?}"
+    );
+    // Where the robot really was stays what it was.
+    assert_eq!(truths(&honest), truths(&recorded));
+
+    // Raw odometry goes on from what it was before the scan.
+    let raw = odom(0.0, 1.0) + &flaser(0.1, 2.0) + &odom(0.2, 3.0) + &flaser(0.3, 4.0) + &odom(0.4, 5.0);
+    assert!(!told(&read(&raw)).iter().any(|line| line.contains("begins anew")));
+}

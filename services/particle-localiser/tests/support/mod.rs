@@ -78,14 +78,21 @@ pub fn malaga() -> Drive {
     Drive { looks, grid, map }
 }
 
+/// The odometry of these logs was corrected too: after a scan it goes on from the scan's corrected pose. Only the steps between two scans
+/// are the robot's own, and are put one to the other's end.
 fn read_carmen(text: &str) -> Vec<Look> {
     let (mut looks, mut way) = (Vec::new(), Vec::new());
+    let (mut recorded, mut odometry) = (None::<Pose2>, Pose2::IDENTITY);
     for line in text.lines() {
         let words: Vec<&str> = line.split_ascii_whitespace().collect();
         let number = |index: usize| words[index].parse::<f64>().unwrap();
         let pose = |index| Pose2::new(number(index), number(index + 1), number(index + 2));
         match words.first() {
-            Some(&"ODOM") => way.push(pose(1)),
+            Some(&"ODOM") => {
+                let last = recorded.replace(pose(1)).unwrap_or(pose(1));
+                odometry = odometry.compose(last.to(pose(1)));
+                way.push(odometry);
+            }
             Some(&"FLASER") => {
                 let count = number(1) as usize;
                 let step = if count > 181 { PI / 360.0 } else { PI / 180.0 };
@@ -96,6 +103,7 @@ fn read_carmen(text: &str) -> Vec<Look> {
                     ..RangeScan::default()
                 };
                 let ranges = (2..2 + count).map(|index| number(index) as f32).collect();
+                recorded = Some(pose(2 + count));
                 looks.push(Look { way: std::mem::take(&mut way), truth: pose(2 + count), header, ranges });
             }
             _ => {}
