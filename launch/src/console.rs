@@ -12,7 +12,7 @@ use std::time::Duration;
 /// Lines that may wait for a slow reader.
 const WAITING_MAX: usize = 1024;
 /// For so long a run waits at its end for the last lines to be read.
-const LAST_WORDS: Duration = Duration::from_millis(500);
+const LAST_WORDS: Duration = Duration::from_millis(300);
 
 /// Where a line goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

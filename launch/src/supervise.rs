@@ -393,20 +393,27 @@ impl Supervisor {
         lines.iter().map(|line| harmless(line)).collect()
     }
 
+    /// Stops the robot: who drives its wheels leaves, and nobody comes in its place. Nothing that has to do with people or disks comes before.
+    pub(crate) fn halt(&mut self, hurry: &dyn Fn() -> bool) {
+        let driver = self.host.manifest().topic(WHEELS).and_then(|(_, topic)| topic.publisher.clone());
+        let is_driver = |index: &usize| Some(&self.services[*index].service.role) == driver.as_ref();
+        let drivers: Vec<usize> = (0..self.services.len()).filter(is_driver).collect();
+        drivers.iter().for_each(|&index| self.dismiss(index));
+        self.end(&drivers, hurry);
+    }
+
     /// Stops the robot first, then the services, and takes the board down. What services could not leave in order, a sentence each.
     ///
     /// # Errors
     /// When something of the board cannot be removed.
     pub(crate) fn stop(mut self, hurry: &dyn Fn() -> bool) -> io::Result<Vec<String>> {
+        self.halt(hurry);
         self.cleaner.stop();
         for index in 0..self.services.len() {
             self.dismiss(index);
         }
-        let driver = self.host.manifest().topic(WHEELS).and_then(|(_, topic)| topic.publisher.clone());
-        let (first, rest): (Vec<usize>, Vec<usize>) = (0..self.services.len())
-            .partition(|&index| Some(&self.services[index].service.role) == driver.as_ref());
-        self.end(&first, hurry);
-        self.end(&rest, hurry);
+        let all: Vec<usize> = (0..self.services.len()).collect();
+        self.end(&all, hurry);
         for (process, _) in &mut self.leaving {
             process.end_now(KILLED_LIMIT);
         }

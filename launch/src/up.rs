@@ -85,6 +85,8 @@ fn run(
     let mut record = Record::begin(board, &graph.file, graph.seed, false);
     keep(&mut supervisor, &record);
     let end = watch(options, &mut supervisor, &mut monitor, &mut recording, &mut desk);
+    let hurry = || signals.count() > 1;
+    supervisor.halt(&hurry);
     supervisor.note(
         "",
         why(&end),
@@ -100,7 +102,7 @@ fn run(
     drop(monitor);
     let recorded = recording.map_or(Ok(()), Recording::end);
     let folder = supervisor.logs().clone();
-    let stopped = supervisor.stop(&|| signals.count() > 1);
+    let stopped = supervisor.stop(&hurry);
     console.release();
     if let End::Broken(role) = &end {
         console.error(&format!("error: `{role}` cannot go on; the last lines of its log:"));

@@ -29,7 +29,7 @@ const PERIOD: Duration = Duration::from_millis(100);
 /// For so long the launcher may take to say how everything stands.
 const ANSWER_WITHIN: Duration = Duration::from_secs(1);
 /// For so long a view may take to give the terminal back; one that does not take its last picture is left as it is.
-const CLOSE_WITHIN: Duration = Duration::from_millis(500);
+const CLOSE_WITHIN: Duration = Duration::from_millis(250);
 /// Lines of a log that are kept for the picture.
 const LOG_LINES: usize = 200;
 
