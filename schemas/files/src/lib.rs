@@ -75,6 +75,19 @@ pub fn bytes_in_words(bytes: u64) -> String {
     }
 }
 
+/// Text of a file for a sentence about it: if it is long, its first 80 characters and its size.
+pub fn in_brief(text: &str) -> String {
+    clipped(text, 80)
+}
+
+/// At most so many characters of a text, and its size if that is not all.
+pub fn clipped(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        None => text.to_owned(),
+        Some((end, _)) => format!("{} .. ({} in all)", &text[..end], bytes_in_words(text.len() as u64)),
+    }
+}
+
 /// Says which file a problem is in.
 fn at<P: Into<FileProblem>>(path: &Path) -> impl Fn(P) -> FileError {
     move |problem| FileError { path: path.to_owned(), problem: problem.into() }

@@ -167,3 +167,12 @@ proptest::proptest! {
         }
     }
 }
+
+#[test]
+fn long_texts_are_quoted_in_brief() {
+    assert_eq!(in_brief("0.65"), "0.65");
+    assert_eq!(in_brief(&"x".repeat(80)), "x".repeat(80));
+    assert_eq!(in_brief(&"x".repeat(2048)), format!("{} .. (2 KiB in all)", "x".repeat(80)));
+    // Never in the middle of a character.
+    assert_eq!(clipped("\u{e4}\u{f6}\u{fc}", 2), "\u{e4}\u{f6} .. (6 bytes in all)");
+}

@@ -178,8 +178,10 @@ pub enum MapProblem {
 impl MapHeader {
     /// Reads the text of a YAML file.
     pub fn parse(text: &str) -> Result<Self, MapProblem> {
-        let entries = yaml::parse(text)
-            .map_err(|error| MapProblem::Syntax { line: error.line, problem: error.problem })?;
+        let entries = yaml::parse(text).map_err(|error| MapProblem::Syntax {
+            line: error.line,
+            problem: files::in_brief(&error.problem),
+        })?;
         let find = |key: &'static str| entries.iter().find(|entry| entry.key == key);
         let need = |key: &'static str| find(key).ok_or(MapProblem::Missing { key });
         let mode = find("mode").map_or(Ok(MapMode::default()), mode)?;
@@ -272,7 +274,7 @@ fn bad(key: &'static str, entry: &Entry, wanted: &'static str) -> MapProblem {
         Value::List(items) => format!("[{}]", items.join(", ")),
         Value::Other => "a table or a longer list".to_owned(),
     };
-    MapProblem::BadValue { line: entry.line, key, value, wanted }
+    MapProblem::BadValue { line: entry.line, key, value: files::in_brief(&value), wanted }
 }
 
 fn number(

@@ -219,7 +219,9 @@ impl World {
     pub fn parse(text: &str) -> Result<Self, WorldError> {
         let world: Self = toml::from_str(text).map_err(|error| {
             let (line, column) = line_and_column(text, error.span().map_or(0, |span| span.start));
-            WorldError::Syntax { path: None, line, column, message: error.message().replace('\n', " ") }
+            // A name that is not known stands in it, however long, before those that are.
+            let message = files::clipped(&error.message().replace('\n', " "), 1000);
+            WorldError::Syntax { path: None, line, column, message }
         })?;
         world.find_problem().map_or(Ok(()), |found| {
             let line = found.line_in(text);

@@ -78,6 +78,8 @@ fn broken_headers_are_refused() {
         "line 2: resolution: \"0.0\" is not a positive number of metres, from 0.001 to 10",
     );
     refused_when("0.05", "0.0009", "from 0.001 to 10");
+    // Who reads a sentence wants no megabyte in it.
+    refused_when("0.05", &"0.".repeat(1024), "0.0.0. .. (2 KiB in all)\" is not a positive number");
     refused_when("0.05", "10.1", "from 0.001 to 10");
     refused_when("0.05", "1e308", "from 0.001 to 10");
     refused_when("0.05", "-1", "positive");

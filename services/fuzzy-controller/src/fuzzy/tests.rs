@@ -464,6 +464,7 @@ fn systems_are_bounded() {
         "more than 10000 rules",
     );
     too_many("FUNCTION_BLOCK heat", &"a ".repeat(400_000), "more than 300000 words");
+    too_many("FUNCTION_BLOCK heat", &"a".repeat(201), "more than 200 characters in a name");
 }
 
 #[track_caller]

@@ -19,6 +19,8 @@ pub(super) struct Placed {
 
 /// A system of ten thousand rules has as many.
 const MOST_TOKENS: usize = 300_000;
+/// Names stand in what is said about them.
+const MOST_CHARACTERS: usize = 200;
 
 /// The longest first.
 const SYMBOLS: [&str; 11] = [":=", "..", ":", ";", "(", ")", ",", "|", "-", "+", "."];
@@ -93,15 +95,20 @@ pub(super) fn tokens(text: &str) -> Result<Vec<Placed>, FclError> {
         let (line, column) = (cursor.line, cursor.column);
         let token = match cursor.rest.chars().next() {
             None => Token::End,
-            Some(first) if first.is_alphabetic() || first == '_' => Token::Word(
-                cursor.take_while(|character| character.is_alphanumeric() || character == '_').to_string(),
-            ),
+            Some(first) if first.is_alphabetic() || first == '_' => {
+                let word = cursor.take_while(|character| character.is_alphanumeric() || character == '_');
+                if word.chars().nth(MOST_CHARACTERS).is_some() {
+                    let kind = FclErrorKind::TooMany { what: "characters in a name", most: MOST_CHARACTERS };
+                    return Err(FclError { line, column, kind });
+                }
+                Token::Word(word.to_string())
+            }
             Some(first) => {
                 let length = number_length(cursor.rest);
                 if length > 0 {
                     let digits = cursor.take(length);
                     let number = digits.replace('_', "").parse();
-                    let number = number.map_err(|_| FclErrorKind::Number(digits.to_string()));
+                    let number = number.map_err(|_| FclErrorKind::Number(files::in_brief(digits)));
                     Token::Number(number.map_err(|kind| FclError { line, column, kind })?)
                 } else if let Some(symbol) = SYMBOLS.iter().find(|symbol| cursor.rest.starts_with(**symbol)) {
                     cursor.take(symbol.len());
