@@ -480,7 +480,7 @@ fn odometry_that_knows_the_truth_is_told_and_can_be_left_out() {
     assert_eq!(odometry(&recorded)[2..5], [1.0, 1.5, 1.8]);
 
     let params = Params { odometry: OdometryLines::BetweenScans, ..Params::default() };
-    let honest = crate::carmen::read_as(&corrected(), &params);
+    let honest = carmen::read_as(&corrected(), &params);
     says(&honest, "5 steps to a scan's pose are left out");
     let wheels = odometry(&honest);
     let expected = [0.0, 0.4, 0.4, 0.9, 1.2, 1.2, 1.7, 2.0];
