@@ -12,6 +12,7 @@ mod by_topic;
 mod cdr;
 mod compare;
 mod read;
+mod records;
 mod write;
 
 #[cfg(test)]

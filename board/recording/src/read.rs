@@ -2,7 +2,7 @@
 
 use crate::cdr::MESSAGE_MAX;
 use crate::format::{CONTEXT, Context, METADATA, METADATA_END, MISFIT, VERSION, read_misfit, take};
-use crate::{Codec, Envelope, Manifest, RecordingError, Topic, codecs};
+use crate::{Codec, Envelope, Manifest, RecordingError, Topic, codecs, records};
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::cmp::Reverse;
@@ -108,7 +108,7 @@ impl Recording {
                 // Too large a note is none.
                 op::METADATA if record.end - record.start <= METADATA_MAX => {
                     let body = read_range(&file, record.start + HEAD..record.end).map_err(io())?;
-                    let Ok(Record::Metadata(metadata)) = mcap::parse_record(opcode, &body) else { continue };
+                    let Some(Record::Metadata(metadata)) = records::parse(opcode, &body) else { continue };
                     if metadata.name == METADATA {
                         manifest = Some(parse_manifest(&metadata.metadata).map_err(|why| not(&why))?);
                     } else if metadata.name == METADATA_END {
@@ -167,7 +167,7 @@ impl Recording {
         if let Some(first) = recording.chunks.first() {
             let mut found = HashMap::new();
             let _ = recording.each_record(first, |opcode, body| {
-                if let (op::CHANNEL, Ok(Record::Channel(channel))) = (opcode, parse_channel(opcode, body))
+                if let (op::CHANNEL, Some(Record::Channel(channel))) = (opcode, records::parse(opcode, body))
                     && let Some((topic, _)) = recording.manifest.topic(channel.topic.trim_start_matches('/'))
                 {
                     found.insert(channel.id, topic);
@@ -256,6 +256,9 @@ impl Recording {
             return Err(self.too_much("bytes of a chunk", count, CHUNK_MAX));
         }
         let bytes = read_range(&self.file, chunk.record.clone()).map_err(RecordingError::io(&self.path))?;
+        if !records::chunk_has_true_lengths(&bytes, HEAD as usize + CHUNK_HEAD) {
+            return Err(RecordingError::mcap(&self.path)(mcap::McapError::UnexpectedEof));
+        }
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
@@ -429,7 +432,7 @@ impl Messages<'_> {
                 }
             }
             op::CHANNEL => {
-                if let Ok(Record::Channel(channel)) = parse_channel(opcode, body)
+                if let Some(Record::Channel(channel)) = records::parse(opcode, body)
                     && let Some((topic, _)) = recording.manifest.topic(channel.topic.trim_start_matches('/'))
                 {
                     channels.insert(channel.id, topic);
@@ -474,10 +477,6 @@ fn parse_manifest(metadata: &BTreeMap<String, String>) -> Result<Manifest, Strin
     }
     let json = metadata.get("manifest").ok_or("its table of contents is empty")?;
     serde_json::from_str(json).map_err(|error| format!("its table of contents cannot be read: {error}"))
-}
-
-fn parse_channel(opcode: u8, body: &[u8]) -> Result<Record<'_>, mcap::McapError> {
-    mcap::parse_record(opcode, body)
 }
 
 /// Channel, sequence, log time and publish time; the data are left.
