@@ -37,6 +37,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use store::{Outcome, Record, Store, Use};
 
+/// The longest word of refusal, in characters: names of the file stand in it.
+const WORDS_MAX: usize = 5000;
+
 /// `launch experiment`. Fails when a variant is refused, a run could not be done, an expectation does not
 /// hold, or the person left early.
 pub(crate) fn command(args: &ExperimentArgs) -> ExitCode {
@@ -44,7 +47,7 @@ pub(crate) fn command(args: &ExperimentArgs) -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
-            warn(&format!("error: {error}"));
+            warn(&format!("error: {}", files::clipped(&error.to_string(), WORDS_MAX)));
             ExitCode::FAILURE
         }
     }
@@ -166,7 +169,8 @@ fn checked_keys(plan: &Plan, build: bool) -> Option<Vec<String>> {
         seen.push((run.variant, &run.situation));
         let request = Request { graph: plan.graph.clone(), overrides: run.overrides.clone(), build };
         let Some(checked) = graph::prepare(&request) else {
-            warn(&format!("so `{}` is refused, and no run was begun", plan.variants[run.variant].name));
+            let name = files::in_brief(&plan.variants[run.variant].name);
+            warn(&format!("so `{name}` is refused, and no run was begun"));
             return None;
         };
         prints.entry(run.variant).or_insert_with(|| fingerprint(&checked, &mut hashes));

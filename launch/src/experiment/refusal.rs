@@ -2,6 +2,15 @@
 
 use super::plan::RUNS_MAX;
 
+/// The longest excerpt of a file with its complaint, in characters.
+const EXCERPT_MAX: usize = 2000;
+
+/// With the line in question, unless that is endless.
+fn shown(cause: &toml::de::Error) -> String {
+    let text = cause.to_string();
+    if text.len() <= EXCERPT_MAX { text } else { files::clipped(cause.message(), EXCERPT_MAX) }
+}
+
 /// Why an experiment file is refused.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum PlanError {
@@ -14,7 +23,7 @@ pub(super) enum PlanError {
         cause: files::FileProblem,
     },
     /// The file is no experiment.
-    #[error("{file}: {cause}")]
+    #[error("{file}: {}", shown(.cause))]
     Malformed {
         /// The file.
         file: String,

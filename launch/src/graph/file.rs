@@ -32,6 +32,8 @@ const FILE_MAX: u64 = 1 << 20;
 /// Files that include each other in a row, and files in all: no graph is made of more parts.
 const INCLUDES_DEEP: usize = 16;
 const INCLUDES_MAX: usize = 100;
+/// So many names lead to a parameter at most: tables within tables are walked through one within the other.
+const KEYS_MAX: usize = 32;
 
 /// Reads a graph file with everything it includes. What is wrong goes to `problems`; the graph is there
 /// unless the mistakes leave nothing to look at.
@@ -274,6 +276,10 @@ fn apply(overrides: &Overrides, table: &mut Table, problems: &mut Problems) {
         if rest.is_empty() || keys.iter().any(|key| key.name.is_empty()) {
             let message = format!("`{}` names no parameter", change.path);
             let help = format!("write --set {}.parameter=value", role.name);
+            problems.push(Problem::error(&change.path_place, message, help));
+        } else if keys.len() > KEYS_MAX {
+            let message = format!("`{}` has {} parts", files::in_brief(&change.path), keys.len());
+            let help = format!("a parameter lies no deeper than {KEYS_MAX} tables");
             problems.push(Problem::error(&change.path_place, message, help));
         } else if role.name == "graph" || find_service(table, &role.name, &role.place, problems) {
             let value = parse_value(&source, change.value_offset, problems);

@@ -6,6 +6,8 @@ use std::fmt::Write as _;
 
 /// Longest source line that is shown whole, in characters.
 const LINE_MAX: usize = 110;
+/// Longest sentence: names of a file stand in it, however long they are there.
+const WORDS_MAX: usize = 2000;
 
 /// How bad a problem is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -37,8 +39,8 @@ impl Problem {
         Self {
             severity: Severity::Error,
             place: Some(place.clone()),
-            message: message.into(),
-            help: help.into(),
+            message: files::clipped(&message.into(), WORDS_MAX),
+            help: files::clipped(&help.into(), WORDS_MAX),
             related: Vec::new(),
         }
     }
@@ -48,8 +50,8 @@ impl Problem {
         Self {
             severity: Severity::Error,
             place: None,
-            message: message.into(),
-            help: help.into(),
+            message: files::clipped(&message.into(), WORDS_MAX),
+            help: files::clipped(&help.into(), WORDS_MAX),
             related: Vec::new(),
         }
     }
@@ -61,7 +63,7 @@ impl Problem {
 
     /// The same with another place that has to do with it.
     pub(crate) fn see(mut self, place: &Place, how: impl Into<String>) -> Self {
-        self.related.push((place.clone(), how.into()));
+        self.related.push((place.clone(), files::clipped(&how.into(), WORDS_MAX)));
         self
     }
 
