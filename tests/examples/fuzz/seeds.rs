@@ -544,11 +544,21 @@ fn graphs() -> Vec<String> {
     all
 }
 
+/// A graph that is in order, so that an experiment's own mistakes count.
+const RIGHT_GRAPH: &str = "[graph]
+name = \"small\"
+seed = 3
+external = [\"location/pose\", \"laser/scan\"]
+
+[mapper]
+width_m = 140.0
+";
+
 fn experiments(scratch: &Path) -> Vec<String> {
-    let graph = scratch.join("small.toml");
-    std::fs::write(&graph, GRAPH).unwrap();
+    let graph = scratch.join("right.toml");
+    std::fs::write(&graph, RIGHT_GRAPH).unwrap();
     let first = format!(
-        "graph = {graph:?}\nlimit_s = 20.0\nseeds = {{ from = 1, count = 3 }}\n\n[set.mapper]\nwidth_m = 100.0\n\n[[variant]]\nname = \"one\"\nexpect = {{ passes = [1, 1] }}\n\n[[variant]]\nname = \"two\"\nwithout = [\"mapper\"]\n[variant.set]\nlog-player = {{ period_s = 0.05 }}\n"
+        "graph = {graph:?}\nlimit_s = 20.0\nseeds = {{ from = 1, count = 3 }}\n\n[set.mapper]\nwidth_m = 100.0\n\n[across]\n\"mapper.height_m\" = [50.0, 60.0]\n\n[[variant]]\nname = \"one\"\nexpect = {{ passes = [1, 1] }}\n\n[[variant]]\nname = \"two\"\n[variant.set]\nmapper = {{ resolution_m = 0.1 }}\n"
     );
     let second = format!(
         "graph = {graph:?}\nseeds = [1, 5, 9]\nlimit_s = 5\n\n[[variant]]\nname = \"only\"\n[variant.set]\n\"mapper.height_m\" = 20.0\n"
