@@ -45,6 +45,8 @@ use trail::Trail;
 const SHARES: [f64; 6] = [1.0, 0.75, 0.5, 0.3, 0.15, 0.07];
 /// What the guard's side radius keeps free, and a little: so the guard need not stop the robot for what the driver can see coming.
 const OFF_SIDES_M: f64 = 0.030;
+/// No guard keeps more free at the sides.
+const MOST_M: f64 = 1.0;
 
 /// What the driver looks at.
 #[derive(Debug, Clone, Copy, Default)]
@@ -320,7 +322,8 @@ fn gain_at_most(present_mps: f64, wanted_mps: f64, gain_mps: f64) -> f64 {
 /// How far from the hull things shall stay.
 fn off_m(clearance: &Clearance) -> f64 {
     let side_m = f64::from(clearance.right_radius_m.max(clearance.left_radius_m));
-    side_m.clamp(0.0, 1.0) + OFF_SIDES_M
+    // A radius that is no number may be any.
+    (if side_m.is_nan() { MOST_M } else { side_m.clamp(0.0, MOST_M) }) + OFF_SIDES_M
 }
 
 /// Whether the reason is one with which wheels may turn.

@@ -362,6 +362,7 @@ proptest! {
     #[test]
     fn whatever_comes_the_wheels_rest_or_obey_within_limits(
         words in proptest::collection::vec((bytes::<Clearance>(), bytes::<WheelSpeeds>(), bytes::<MotionCommand>(), any::<[u8; 16]>(), any::<[f32; 4]>(), 0u8..32, 0u64..200), 1..40),
+        sides in proptest::collection::vec(proptest::sample::select(&[f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 0.05, 1e30]), 2),
         room in prop_oneof![Just(Room::Seen), Just(Room::Ordered), Just(Room::Unchecked)],
     ) {
         let params = Params { room, ..Params::default() };
@@ -376,7 +377,7 @@ proptest! {
             if plausible & 1 != 0 { word = Clearance { signal: messages::GuardSignal(word.signal.0 & 1), reason: GuardReasonName::Violation.into(), violated_faces: word.violated_faces & 1, ..word } }
             if plausible & 2 != 0 { wished = WheelSpeeds { left_mps: wished.left_mps.sin(), right_mps: wished.right_mps.sin() } }
             if plausible & 4 != 0 { wished = WheelSpeeds { left_mps: -0.13 * wished.left_mps.sin().abs(), right_mps: -0.13 * wished.right_mps.sin().abs() } }
-            if plausible & 8 != 0 { word = Clearance { at_x_m: 0.0, at_y_m: 0.0, at_heading_rad: 0.0, front_radius_m: 0.2, max_age_ms: 150, violated_faces: 0, ..word } }
+            if plausible & 8 != 0 { word = Clearance { at_x_m: 0.0, at_y_m: 0.0, at_heading_rad: 0.0, front_radius_m: 0.2, right_radius_m: sides[0], left_radius_m: sides[1], max_age_ms: 150, violated_faces: 0, ..word } }
             if plausible & 16 != 0 { [left_m, right_m] = [&travel[..8], &travel[8..]].map(|raw| f64::from_le_bytes(raw.try_into().unwrap())); }
             let stamp = at(now_ms - age_ms);
             let near = [NearPoint { x_m: near[0], y_m: near[1] }, NearPoint { x_m: near[2], y_m: near[3] }];
