@@ -104,7 +104,7 @@ fn manifest_inside(name: &str) -> String {
 }
 
 fn manifest_outside(name: &str, sources: &Path) -> Result<String, String> {
-    let workspace: toml::Table = toml::from_str(WORKSPACE).map_err(|error| error.to_string())?;
+    let workspace: toml::Table = files::toml::parse(WORKSPACE).map_err(|error| error.to_string())?;
     let table = |key: &str| workspace.get(key).and_then(toml::Value::as_table);
     let dependencies =
         table("workspace").and_then(|table| table.get("dependencies")).and_then(toml::Value::as_table);
@@ -190,7 +190,8 @@ mod tests {
     #[test]
     fn a_repository_of_its_own_has_the_versions_and_profiles_of_the_workspace() {
         let text = manifest_outside("door-bell", Path::new("/opt/cork\"board")).unwrap();
-        let manifest: toml::Table = toml::from_str(&text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let manifest: toml::Table =
+            files::toml::parse(&text).unwrap_or_else(|error| panic!("{error}\n{text}"));
         assert_eq!(manifest["dependencies"]["board"]["path"].as_str(), Some("/opt/cork\"board/board"));
         assert!(manifest["dependencies"]["serde"]["version"].is_str());
         assert!(manifest["profile"]["dev"].is_table() && manifest["workspace"].is_table());

@@ -246,7 +246,7 @@ pub(super) fn read(file: &Path, choice: &Choice) -> Result<Plan, PlanError> {
 
 /// The same of a text; `folder` is that of the file.
 pub(super) fn parse(text: &str, stem: &str, folder: &Path, choice: &Choice) -> Result<Plan, PlanError> {
-    let mut file: File = toml::from_str(text)
+    let mut file: File = files::toml::parse(text)
         .map_err(|cause| PlanError::Malformed { file: stem.to_owned(), cause: Box::new(cause) })?;
     if !file.worlds.is_empty() {
         let worlds = file.worlds.iter().cloned().map(Value::String).collect();

@@ -1,12 +1,14 @@
 //! Why an experiment is refused.
 
+use files::toml::TomlError;
+
 use super::plan::RUNS_MAX;
 
 /// The longest excerpt of a file with its complaint, in characters.
 const EXCERPT_MAX: usize = 2000;
 
 /// With the line in question, unless that is endless.
-fn shown(cause: &toml::de::Error) -> String {
+fn shown(cause: &TomlError) -> String {
     let text = cause.to_string();
     if text.len() <= EXCERPT_MAX { text } else { files::clipped(cause.message(), EXCERPT_MAX) }
 }
@@ -28,7 +30,7 @@ pub(super) enum PlanError {
         /// The file.
         file: String,
         /// What is wrong, with its line.
-        cause: Box<toml::de::Error>,
+        cause: Box<TomlError>,
     },
     /// Something to vary that is no list.
     #[error("`{key}` takes a list of values, such as [{value}]")]

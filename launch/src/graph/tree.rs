@@ -2,6 +2,7 @@
 
 use super::problem::{Problem, Problems};
 use super::source::{Place, Source};
+use files::toml::TomlError;
 use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -157,7 +158,9 @@ const KEYS_MAX: usize = 1000;
 
 /// Reads a TOML file. Every mistake in its syntax is reported; with one there is no table.
 pub(crate) fn parse(source: &Arc<Source>, problems: &mut Problems) -> Option<Table> {
-    let (table, errors) = DeTable::parse_recoverable(&source.text);
+    let (table, errors) = files::toml::parse_recoverable(&source.text)
+        .map_err(|error| problems.push(syntax_problem(source, &error)))
+        .ok()?;
     for error in errors.iter().take(SYNTAX_ERRORS_MAX) {
         problems.push(syntax_problem(source, error));
     }
@@ -171,14 +174,14 @@ pub(crate) fn parse_value(source: &Arc<Source>, offset: usize, problems: &mut Pr
     let text = source.text.get(offset..).unwrap_or_default();
     let place = Place::new(source, offset..source.text.len());
     let number = || text.trim().parse().ok().and_then(serde_json::Number::from_f64);
-    let content = match DeValue::parse(text) {
+    let content = match files::toml::parse_value(text) {
         Ok(value) => Convert { source, offset, problems }.value(value.get_ref(), &place),
         Err(_) => number().map_or_else(|| Content::Text(text.to_owned()), Content::Number),
     };
     Node { content, place }
 }
 
-fn syntax_problem(source: &Arc<Source>, error: &toml::de::Error) -> Problem {
+fn syntax_problem(source: &Arc<Source>, error: &TomlError) -> Problem {
     let place = error.span().map_or_else(|| Place::top(source), |span| Place::new(source, span));
     let name = place.text().trim().trim_matches(['[', ']', '"']);
     if error.message() == "duplicate key" && !name.is_empty() {

@@ -7,6 +7,7 @@
 //! but a plain file.
 
 mod read;
+pub mod toml;
 mod write;
 
 pub use read::{Unpacked, check, open, read, read_text, read_unpacked, text};

@@ -217,7 +217,7 @@ pub enum WorldProblem {
 impl World {
     /// Reads and checks the text of a world file.
     pub fn parse(text: &str) -> Result<Self, WorldError> {
-        let world: Self = toml::from_str(text).map_err(|error| {
+        let world: Self = files::toml::parse(text).map_err(|error| {
             let (line, column) = line_and_column(text, error.span().map_or(0, |span| span.start));
             // A name that is not known stands in it, however long, before those that are.
             let message = files::clipped(&error.message().replace('\n', " "), 1000);

@@ -45,7 +45,7 @@ struct Spans {
 impl Found {
     /// The line where the item begins; 1 for what concerns the whole file.
     pub(super) fn line_in(&self, text: &str) -> usize {
-        let spans: Spans = toml::from_str(text).unwrap_or_default();
+        let spans: Spans = files::toml::parse(text).unwrap_or_default();
         let list = match self.list {
             "floor" => &spans.floor,
             "door" => &spans.door,
