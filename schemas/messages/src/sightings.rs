@@ -22,7 +22,7 @@ const WEIGHT_MAX: u8 = 12;
 /// What was not seen for so long, or lies so far away, is forgotten.
 const KEPT_S: f64 = 20.0;
 const KEPT_WITHIN_M: f64 = 1.5;
-/// So many points are remembered at most.
+/// So many points are remembered at most; the oldest makes room for another.
 pub const SIGHTINGS_MAX: usize = 800;
 
 /// Something that was seen.
@@ -96,7 +96,11 @@ impl Sightings {
         if let Some(point) = known {
             point.seen = now;
             point.weight = (point.weight + SIGHTING).min(WEIGHT_MAX);
-        } else if self.points.len() < SIGHTINGS_MAX && place.x.is_finite() && place.y.is_finite() {
+        } else if place.x.is_finite() && place.y.is_finite() {
+            if self.points.len() >= SIGHTINGS_MAX {
+                let oldest = (0..self.points.len()).min_by_key(|&index| self.points[index].seen);
+                oldest.map(|index| self.points.swap_remove(index));
+            }
             self.points.push(Sighting { place, seen: now, weight: SIGHTING });
         }
     }
@@ -110,7 +114,12 @@ impl Sightings {
 
     /// Lets everything be as old as it was so long ago.
     pub fn hold(&mut self, time: std::time::Duration) {
-        for point in &mut self.points {
+        self.hold_where(time, |_| true);
+    }
+
+    /// The same for what lies at such places.
+    pub fn hold_where(&mut self, time: std::time::Duration, is_held: impl Fn(Point2<f64>) -> bool) {
+        for point in self.points.iter_mut().filter(|point| is_held(point.place)) {
             point.seen = point.seen.after(time);
         }
     }
@@ -193,6 +202,16 @@ mod tests {
         check_left(|all| (0..9).for_each(|_| all.see_through(ahead, 0.8, 0.0)), 2);
         check_left(|all| all.add(at(1), Point2::new(0.8, 0.01)), 3);
         check_left(|all| all.add(at(1), Point2::new(f64::NAN, 0.0)), 3);
+    }
+
+    #[test]
+    fn the_oldest_makes_room() {
+        let mut sightings = Sightings::default();
+        for index in 0..=SIGHTINGS_MAX {
+            sightings.add(at(index as u64), Point2::new(index as f64, 0.0));
+        }
+        assert_eq!(sightings.len(), SIGHTINGS_MAX);
+        assert!(sightings.iter().all(|point| point.place.x > 0.5), "the first is gone, and no other");
     }
 
     #[test]

@@ -15,6 +15,12 @@ const TOLD_WITHIN_M: f64 = 0.6;
 /// So many points are told at most, the nearest ones.
 const TOLD_MAX: usize = 256;
 const TOLD_APART_M: f32 = 0.02;
+/// A robot that has not come farther than this for so long stands.
+const STANDS_WITHIN_M: f64 = 0.03;
+const STANDS_WITHIN_RAD: f64 = 0.05;
+const STANDS_AFTER_S: f64 = 1.0;
+/// What lies so near to the hull can be touched by a turn before a sensor sees it.
+const HELD_WITHIN_M: f64 = 0.15;
 /// In another frame, or after an unseen journey, places mean nothing.
 const JUMP_M: f64 = 0.5;
 
@@ -86,6 +92,8 @@ pub(crate) struct Near {
     /// Walls beyond the ends of what was seen of them.
     assumed: Vec<(Time, Point2<f64>)>,
     place: Option<Pose2>,
+    /// Where the robot has been since when, and when it was last heard of.
+    stay: Option<(Pose2, Time, Time)>,
     /// The walls of each floor of the map, and those points of them that are near now.
     floors: Vec<(i32, Vec<Segment>)>,
     walls: Vec<Point2<f64>>,
@@ -238,11 +246,29 @@ impl Near {
             self.ends.clear();
             self.assumed.clear();
         }
+        self.hold_while_it_stands(now, here, hull);
         self.sightings.forget(now, here, hull, 0.0);
         self.rims.forget(now, here, hull, 0.0);
         let frame = here.frame();
         self.ends.retain(|end| hull.distance_to_m(frame.inverse_transform(end.place)) < SEEN_WITHIN_M);
         Some(here)
+    }
+
+    /// What was seen close to the hull does not grow old while the robot stands: a leg of a chair at a corner of the hull, where no sensor looks, is still there
+    /// when it drives on, however long it was loaded.
+    fn hold_while_it_stands(&mut self, now: Time, here: Pose2, hull: &Hull) {
+        let is_near = |there: Pose2| {
+            there.distance_m(here) <= STANDS_WITHIN_M
+                && angle::difference(there.heading_rad, here.heading_rad).abs() <= STANDS_WITHIN_RAD
+        };
+        let (there, since, heard) = self.stay.filter(|stay| is_near(stay.0)).unwrap_or((here, now, now));
+        self.stay = Some((there, since, now));
+        if now.seconds_since(since) > STANDS_AFTER_S {
+            let frame = here.frame();
+            let is_near = |place| hull.distance_to_m(frame.inverse_transform(place)) <= HELD_WITHIN_M;
+            self.sightings.hold_where(now.since(heard), is_near);
+            self.rims.hold_where(now.since(heard), is_near);
+        }
     }
 
     /// Walls go on beyond the ends of what was seen of them: a corner of the hull comes there before a sensor does.

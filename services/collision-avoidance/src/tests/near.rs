@@ -74,6 +74,28 @@ fn what_was_seen_a_moment_ago_is_told_where_it_is_now() {
     assert!(points.is_empty(), "{points:?}");
 }
 
+/// Whether what lay beside the nose is still told beside the tail, where no sensor looks, after so many frames there.
+#[track_caller]
+fn check_remembered(frames: usize, at: impl Fn(usize) -> Pose2, is_there: bool) {
+    let seen = frame([FAR, 0.12, FAR, FAR, FAR, FAR, FAR, FAR]);
+    let mut looks = vec![(Pose2::IDENTITY, seen), (Pose2::new(0.06, 0.0, 0.0), seen)];
+    looks.extend((0..frames).map(|index| (at(index), everywhere(FAR))));
+    let (_, points) = told(Params::default(), &looks);
+    let x_m = 0.17 - at(frames - 1).x_m;
+    check_told(&points, x_m, -0.375, is_there);
+}
+
+#[test]
+fn what_was_seen_does_not_grow_old_while_the_robot_stands() {
+    let stands = |_| Pose2::new(0.3, 0.0, 0.0);
+    let trembles = |frame: usize| Pose2::new(0.3, 0.0, if frame.is_multiple_of(2) { 0.01 } else { -0.01 });
+    let goes_to_and_fro = |frame: usize| Pose2::new(0.3 + 0.05 * (frame / 10 % 2) as f64, 0.0, 0.0);
+    check_remembered(2400, stands, true);
+    check_remembered(2400, trembles, true);
+    check_remembered(300, goes_to_and_fro, true);
+    check_remembered(2400, goes_to_and_fro, false);
+}
+
 /// What the sensors of a robot at `pose` see of a long wall along the line y = `wall_y_m`, in the middle of their cones.
 fn beside(wall_y_m: f64, pose: Pose2) -> TofRanges {
     frame(TofRanges::MOUNTS.map(|mount| {
