@@ -8,14 +8,13 @@
 use board::host::Host;
 use board::manifest::{Manifest, Topic};
 use board::switchboard::Switchboard;
-use board::{About, Envelope, Latest, Publisher, clock};
+use board::{About, Latest, Publisher, clock};
 use iceoryx2::config::Config;
 use iceoryx2::prelude::*;
-use messages::{Message, Parameters, Time};
+use messages::{Message, Misfit, Parameters, Time};
 use rustix::thread::{CpuSet, futex, sched_setaffinity};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::convert::Infallible;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
@@ -76,11 +75,19 @@ impl Default for Params {
     }
 }
 
+/// What the bare transport carries in front of a message: as much as the board does.
+#[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
+#[repr(C)]
+struct Head {
+    stamp_ns: u64,
+    origin_ns: u64,
+    sequence: u64,
+    generation: u32,
+    round: u32,
+}
+
 impl Parameters for Params {
-    type Error = Infallible;
-    fn check(&self) -> Result<(), Infallible> {
-        Ok(())
-    }
+    type Error = Misfit;
 }
 
 fn main() -> ExitCode {
@@ -433,7 +440,7 @@ fn bare(is_ping: bool) -> Result<(), Failure> {
         let messages = node
             .service_builder(&name)
             .publish_subscribe::<[u8]>()
-            .user_header::<Envelope>()
+            .user_header::<Head>()
             .payload_alignment(Alignment::new(64).ok_or("alignment")?)
             .history_size(1)
             .subscriber_max_buffer_size(4)
@@ -475,7 +482,7 @@ fn bare(is_ping: bool) -> Result<(), Failure> {
         let mut sample = publisher.loan_slice_uninit(params.bytes)?;
         let stamp_ns = if params.stamped { clock::monotonic().as_nanos() } else { 0 };
         *sample.user_header_mut() =
-            Envelope { stamp_ns, origin_ns: stamp_ns, sequence: number, generation: 1, round: 0 };
+            Head { stamp_ns, origin_ns: stamp_ns, sequence: number, generation: 1, round: 0 };
         // SAFETY: bytes of a mapped file have some value, and any will do.
         let mut sample = unsafe { sample.assume_init() };
         let (head, rest) = sample.payload_mut().split_at_mut(8);

@@ -1,83 +1,15 @@
-//! What the launcher knows of its board besides what stands on the shared page, and how it puts the page
-//! right.
+//! How the launcher puts the shared page right, by what it knows besides.
 //!
 //! Every process of the user may write to the page, and a broken one may write anything. The processes hold
 //! on to what is their own (their place, what wakes them); who may publish, and what kind of time it is, only
 //! the launcher knows.
 
 use crate::clock;
-use crate::host::{Host, SWITCHBOARD, role_of};
+use crate::host::Host;
 use crate::manifest::Manifest;
-use crate::private::{Version, identity};
-use crate::switchboard::{SLOTS, Slot};
-use std::collections::{BTreeMap, BTreeSet};
+use crate::private::identity;
+use crate::switchboard::{self, SLOTS, Slot};
 use std::sync::atomic::{AtomicU32, Ordering};
-
-/// A place that was prepared for a service.
-#[derive(Debug, Clone)]
-struct Prepared {
-    role: String,
-    generation: u32,
-}
-
-/// What was decided, whatever the page says.
-#[derive(Debug)]
-pub(crate) struct Known {
-    /// The last generation that was given to a service.
-    generations: u32,
-    /// The last occupant of each place that a service was given.
-    prepared: BTreeMap<u32, Prepared>,
-    /// Whose messages count: the place and the generation, by role.
-    speakers: BTreeMap<String, (u32, u32)>,
-    /// The file of the table of contents, as it was last written.
-    pub(crate) manifest_file: Option<Version>,
-    /// What cannot be mended, and was said.
-    said: BTreeSet<String>,
-}
-
-impl Known {
-    /// Nobody was started yet, and the table of contents was just written.
-    pub(crate) fn with_manifest(manifest_file: Option<Version>) -> Self {
-        Self {
-            generations: 1,
-            prepared: BTreeMap::new(),
-            speakers: BTreeMap::new(),
-            manifest_file,
-            said: BTreeSet::new(),
-        }
-    }
-
-    /// The generation of the service that is to be started in this place.
-    pub(crate) fn prepare(&mut self, slot: u32, role: &str) -> u32 {
-        self.generations += 1;
-        let prepared = Prepared { role: role.to_owned(), generation: self.generations };
-        self.prepared.insert(slot, prepared);
-        self.generations
-    }
-
-    /// The process in this place plays the role; its generation, `None` for a place that was never prepared.
-    pub(crate) fn hand_over(&mut self, role: &str, slot: u32) -> Option<u32> {
-        let generation = self.prepared.get(&slot)?.generation;
-        self.speakers.insert(role.to_owned(), (slot, generation));
-        Some(generation)
-    }
-
-    /// The place of the living process of this role that has this generation: in a swap the newcomer takes
-    /// its topics by itself.
-    fn place_of(&self, role: &str, generation: u32, living: &[(u32, u32)]) -> Option<u32> {
-        let is_it = |place: &u32| {
-            let prepared = self.prepared.get(place);
-            prepared.is_some_and(|prepared| prepared.role == role && prepared.generation == generation)
-        };
-        living.iter().map(|&(place, _)| place).find(is_it)
-    }
-
-    /// How many living processes may come to play the role.
-    fn players(&self, role: &str, living: &[(u32, u32)]) -> usize {
-        let plays = |place: u32| self.prepared.get(&place).is_some_and(|prepared| prepared.role == role);
-        living.iter().filter(|&&(place, _)| plays(place)).count()
-    }
-}
 
 impl Host {
     /// Looks for damage of the board, mends what can be mended, and says what it was: a sentence each, none
@@ -115,7 +47,7 @@ impl Host {
             let Some(entry) = self.switchboard.topic(index) else { continue };
             let (slot, generation) =
                 (entry.publisher.load(Ordering::Acquire), entry.generation.load(Ordering::Acquire));
-            let Some(role) = role_of(topic) else {
+            let Some(role) = topic.role() else {
                 if restore(&entry.generation, 0) {
                     names.push(format!("`{}`", topic.name));
                 }
@@ -177,7 +109,7 @@ impl Host {
 
     /// Files of the board that were deleted or replaced by somebody else.
     fn look_at_files(&self, found: &mut Vec<String>) {
-        let page = self.place.file(SWITCHBOARD);
+        let page = self.place.file(switchboard::FILE);
         let mut lost = Vec::new();
         if identity(&page) != self.page_file {
             lost.push(format!("the board's page {} was deleted or replaced", page.display()));

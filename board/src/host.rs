@@ -3,15 +3,16 @@
 //! Topics are made here, before any service lives, because a process that is killed while it makes one can leave it unusable
 //! for ever. Services only open them.
 
-use crate::damage::Known;
-use crate::lack::{Lack, SHARED_MEMORY};
+use crate::known::Known;
 use crate::lock::{self, Lock};
 use crate::manifest::{Manifest, Topic};
-use crate::place::{InvalidBoardName, Place, Turn};
+use crate::names::SHARED_MEMORY;
+use crate::place::{Place, Turn};
 use crate::private::{self, Identity, identity};
+use crate::shape::shape_of;
 use crate::sweep::clear_away;
 use crate::switchboard::{self, SlotState, Switchboard};
-use crate::transport::{Member, RawTopic, TopicShape, TransportError};
+use crate::transport::{Member, RawTopic};
 use rustix::io::{FdFlags, fcntl_setfd};
 use std::io;
 use std::os::fd::BorrowedFd;
@@ -19,74 +20,11 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+pub use crate::host_error::HostError;
 pub use crate::need::needed_bytes;
-pub use crate::sweep::{Swept, boards_up, clean_dead, clear, half_made, living_launcher, sweep, sweep_named};
-
-pub(crate) const SWITCHBOARD: &str = "switchboard";
-const HEALTH: &str = "health/";
-/// Readers of a topic beyond those of the graph: tools, recorders, newcomers of a swap, ports of the dead
-/// that were not cleaned up yet. Each publisher has memory for all that they may hold, so topics of large
-/// messages take fewer: so many bytes, so many readers.
-const SPARE_READERS: [(usize, usize); 3] =
-    [(4 * 1024, 12), (64 * 1024, SPARE_READERS_OF_ELEMENTS), (usize::MAX, 3)];
-/// The same for messages with elements, at the most: nobody knows how many there will be.
-const SPARE_READERS_OF_ELEMENTS: usize = 6;
-
-/// Why a board cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum HostError {
-    /// The name.
-    #[error(transparent)]
-    Name(#[from] InvalidBoardName),
-    /// It is up.
-    #[error(
-        "the board `{board}` is up already (launcher {pid}); stop it with `launch stop --board {board}`, or use another name with --board"
-    )]
-    Taken {
-        /// The board.
-        board: String,
-        /// Its launcher's process.
-        pid: u32,
-    },
-    /// It is up, and cannot be reached any more.
-    #[error(
-        "the launcher of the board `{board}` (process {pid}) lives, though the board's folder was deleted, so a second robot is not started \
-         beside it; it stops by itself, or with `kill {pid}`"
-    )]
-    Displaced {
-        /// The board.
-        board: String,
-        /// Its launcher's process.
-        pid: u32,
-    },
-    /// There is not enough shared memory, or something else for it.
-    #[error("the board `{board}` with {topics} topic{} cannot be made: {lack}", if *topics == 1 { "" } else { "s" })]
-    Lack {
-        /// The board.
-        board: String,
-        /// How many topics it was to have.
-        topics: usize,
-        /// What is lacking.
-        lack: Lack,
-    },
-    /// Too many topics.
-    #[error("the graph has {topics} topics; a board holds {}", switchboard::TOPICS)]
-    TooManyTopics {
-        /// How many.
-        topics: usize,
-    },
-    /// Files.
-    #[error("the board's files: {0}")]
-    Io(#[from] io::Error),
-    /// The transport.
-    #[error(transparent)]
-    Transport(#[from] TransportError),
-}
-
-/// What a service's health is published on.
-pub fn health_topic(role: &str) -> String {
-    format!("{HEALTH}{role}")
-}
+pub use crate::sweep::{
+    Swept, boards_up, clean_dead, clear, half_made, living_launcher, orphans, sweep, sweep_named,
+};
 
 /// The name under which a shadow of `role` publishes: a process that is compared with the one that plays the role.
 pub fn shadow_role(role: &str) -> String {
@@ -152,7 +90,7 @@ impl Host {
 
     fn furnish(place: Place, manifest: Manifest, lockstep: bool) -> Result<Self, HostError> {
         let lock = Lock::take(&place)?;
-        let switchboard = Switchboard::create(&place.file(SWITCHBOARD))?;
+        let switchboard = Switchboard::create(&place.file(switchboard::FILE))?;
         switchboard.header().lockstep.store(u32::from(lockstep), Ordering::Release);
         let member = Member::join(&place)?;
         let mut topics = Vec::with_capacity(manifest.topics.len());
@@ -169,7 +107,7 @@ impl Host {
         manifest.write(&place)?;
         let known = Known::with_manifest(Manifest::version(&place));
         Ok(Self {
-            page_file: identity(&place.file(SWITCHBOARD)),
+            page_file: identity(&place.file(switchboard::FILE)),
             files: place.shared_memory(),
             place,
             switchboard,
@@ -260,7 +198,7 @@ impl Host {
     pub fn hand_over(&self, role: &str, slot: u32) {
         let Some(generation) = self.known().hand_over(role, slot) else { return };
         for (index, topic) in self.manifest.topics.iter().enumerate() {
-            if role_of(topic) == Some(role)
+            if topic.role() == Some(role)
                 && let Some(entry) = self.switchboard.topic(index as u32)
             {
                 entry.publisher.store(slot, Ordering::Release);
@@ -304,25 +242,6 @@ impl Drop for Host {
             tracing::warn!(board = self.place.name(), %error, "something of the board is left behind");
         }
     }
-}
-
-pub(crate) fn shape_of(topic: &Topic) -> TopicShape {
-    TopicShape {
-        fingerprint: topic.message.fingerprint(),
-        depth: topic.depth,
-        readers: topic.readers.len() + spare_readers(topic),
-    }
-}
-
-fn spare_readers(topic: &Topic) -> usize {
-    let bytes = topic.room_bytes();
-    let readers = SPARE_READERS.iter().find(|(most, _)| bytes <= *most).map_or(0, |&(_, readers)| readers);
-    if topic.message.element.is_some() { readers.min(SPARE_READERS_OF_ELEMENTS) } else { readers }
-}
-
-/// The role whose process publishes a topic; `None` when messages come from outside.
-pub(crate) fn role_of(topic: &Topic) -> Option<&str> {
-    topic.publisher.as_deref().or_else(|| topic.name.strip_prefix(HEALTH))
 }
 
 /// The transport opens files that the children of this process would inherit.

@@ -3,6 +3,7 @@
 //! The transport reports an exhausted resource by what failed because of it (`InternalFailure`). So on a
 //! failure the limits of the process and the state of shared memory are looked at.
 
+use crate::names::SHARED_MEMORY;
 use crate::segments;
 use crate::terminal::bytes;
 use rustix::fs::{StatVfs, StatVfsMountFlags};
@@ -18,8 +19,6 @@ const BYTES_SPARE: u64 = 64 * 1024;
 const ADDRESS_SPACE_SPARE: u64 = 16 * 1024 * 1024;
 /// Files that shared memory must still have room for.
 const INODES_SPARE: u64 = 16;
-/// Where shared memory lies.
-pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 
 /// A resource that has run out.
 #[derive(Debug, Clone, PartialEq, Eq)]

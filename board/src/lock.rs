@@ -7,7 +7,8 @@
 //! robots on the same wheels. So the processes are looked through for one that still has the file open.
 //! Whatever keeps us from looking is an error, and never means that a launcher is gone.
 
-use crate::place::{self, Place};
+use crate::names::boards_folder;
+use crate::place::Place;
 use crate::private::{self, Identity, identity};
 use rustix::fs::{FlockOperation, OFlags, flock};
 use std::fs::{File, OpenOptions};
@@ -109,7 +110,7 @@ fn board_of(target: &Path) -> Option<Place> {
     let target = Path::new(target.strip_suffix(" (deleted)").unwrap_or(target));
     let folder = target.parent().filter(|_| target.file_name().is_some_and(|name| name == LOCK))?;
     let place = Place::new(folder.file_name()?.to_str()?).ok()?;
-    (folder.parent() == Some(place::boards_folder().as_path())).then_some(place)
+    (folder.parent() == Some(boards_folder().as_path())).then_some(place)
 }
 
 /// Those who only look whether the lock is held have it open for reading.

@@ -4,48 +4,11 @@
 
 use crate::place::Place;
 use crate::private::{self, Version, version};
-use messages::{Description, elements_offset};
+pub use messages::Topic;
 use serde::{Deserialize, Serialize};
 use std::io;
 
 const FILE: &str = "board.json";
-/// Elements that a message has room for where nobody says how many it takes.
-pub const ELEMENTS: usize = 64;
-
-/// One topic of a board.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Topic {
-    /// Its name.
-    pub name: String,
-    /// The service that publishes it; `None` when messages come from outside.
-    pub publisher: Option<String>,
-    /// The services that read it.
-    pub readers: Vec<String>,
-    /// How many messages may wait for a reader.
-    pub depth: usize,
-    /// For messages with elements: for how many there is room from the start. Longer ones get room when they
-    /// come, if there is memory.
-    #[serde(default = "default_elements")]
-    pub elements: usize,
-    /// The type of its messages.
-    pub message: Description,
-}
-
-fn default_elements() -> usize {
-    ELEMENTS
-}
-
-impl Topic {
-    /// Bytes of a message for which there is room from the start.
-    pub fn room_bytes(&self) -> usize {
-        match &self.message.element {
-            Some(element) => elements_offset(self.message.size)
-                .saturating_add(self.elements.max(1).saturating_mul(element.size())),
-            None => self.message.size,
-        }
-    }
-}
-
 /// The table of contents.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, Default)]
 pub struct Manifest {

@@ -3,9 +3,10 @@
 //! What the transport makes for a topic follows from its shape. The sizes of its own book-keeping are those
 //! of iceoryx2 0.10; a test holds them against what is really there.
 
-use crate::host::shape_of;
-use crate::lack::{Lack, SHARED_MEMORY, free_bytes};
+use crate::lack::{Lack, free_bytes};
 use crate::manifest::{Manifest, Topic};
+use crate::names::SHARED_MEMORY;
+use crate::shape::shape_of;
 use crate::switchboard::PAGE_BYTES;
 use crate::transport::{BORROWED, HISTORY, LOANED, message_bytes};
 

@@ -1,16 +1,16 @@
 //! A service's node: where its ports are declared, and what wakes it.
 
-use crate::host::{health_topic, shadow_role, shadow_topic};
+use crate::host::{shadow_role, shadow_topic};
 use crate::interface::{Direction, PortDescription};
 use crate::kept::{Home, Kept};
 use crate::lack::Lack;
-use crate::manifest::{ELEMENTS, Manifest};
+use crate::manifest::Manifest;
 use crate::place::Place;
 use crate::port::{Latest, Publisher, PublisherLink, Queue, Reader, ReaderLink};
 use crate::shared::Shared;
 use crate::switchboard::Switchboard;
 use crate::transport::{Member, Room, TransportError};
-use messages::Message;
+use messages::{ELEMENTS, Message, health_topic};
 use serde::{Serialize, de::DeserializeOwned};
 use std::cell::Cell;
 use std::rc::Rc;
@@ -111,7 +111,7 @@ impl Joined {
         if !place.exists() {
             return Err(JoinError::NoBoard { board });
         }
-        let switchboard = Switchboard::open(&place.file(crate::host::SWITCHBOARD)).map_err(unreadable)?;
+        let switchboard = Switchboard::open(&place.file(crate::switchboard::FILE)).map_err(unreadable)?;
         let manifest = Manifest::read(&place).map_err(unreadable)?;
         let slot = match prepared {
             Some(slot) => slot,

@@ -1,7 +1,10 @@
 //! Where a board lies in shared memory, and how it is found and removed.
 
-use crate::lack::SHARED_MEMORY;
-use crate::{lock, private};
+use crate::names::SHARED_MEMORY;
+use crate::private;
+
+pub use crate::names::boards_folder;
+
 use std::fs;
 use std::io;
 use std::os::unix::fs::MetadataExt as _;
@@ -159,53 +162,6 @@ pub fn places() -> Vec<Place> {
     places
 }
 
-/// Shared memory of this user's boards that belongs to no folder and no living launcher: somebody removed the
-/// folder by hand. Ask for it under [`Turn`] only, or it may belong to a board that is being taken down.
-///
-/// # Errors
-/// When it cannot be told whether a launcher lives.
-pub fn orphans() -> io::Result<Vec<PathBuf>> {
-    let prefixes: Vec<String> = places().into_iter().map(|place| place.prefix).collect();
-    let user = rustix::process::getuid().as_raw();
-    let entries = fs::read_dir(SHARED_MEMORY).map_err(private::at(Path::new(SHARED_MEMORY)))?;
-    let mut orphans: Vec<PathBuf> = entries
-        .flatten()
-        .filter(|entry| {
-            let name = entry.file_name();
-            let name = name.to_string_lossy();
-            is_prefixed(&name)
-                && !prefixes.iter().any(|prefix| name.starts_with(prefix.as_str()))
-                && entry.metadata().is_ok_and(|found| found.is_file() && found.uid() == user)
-        })
-        .map(|entry| entry.path())
-        .collect();
-    if !orphans.is_empty() {
-        // A board whose folder was deleted under its launcher is no orphan: its robot may be driving.
-        let held = lock::holders()?;
-        let is_held = |file: &PathBuf| {
-            let name = file.file_name().unwrap_or_default().to_string_lossy();
-            held.iter().any(|(place, _)| name.starts_with(place.prefix()))
-        };
-        orphans.retain(|file| !is_held(file));
-    }
-    Ok(orphans)
-}
-
-/// Whether this is a segment of some board, by its name.
-pub(crate) fn is_segment(path: &Path) -> bool {
-    path.parent() == Some(Path::new(SHARED_MEMORY))
-        && path.file_name().is_some_and(|name| is_prefixed(&name.to_string_lossy()))
-}
-
-/// Whether a name in shared memory begins as a board's memory does: `c`, eight hexadecimal digits, `_`.
-fn is_prefixed(name: &str) -> bool {
-    let bytes = name.as_bytes();
-    bytes.len() > 10
-        && bytes[0] == b'c'
-        && bytes[9] == b'_'
-        && bytes[1..9].iter().all(|byte| byte.is_ascii_digit() || (b'a'..=b'f').contains(byte))
-}
-
 /// The turn to make or to clear away boards: one process of the user at a time, so that nobody clears away a board that another is just making.
 #[derive(Debug)]
 pub struct Turn {
@@ -278,10 +234,4 @@ fn own_folder(folder: &Path) -> io::Result<u32> {
             found.uid()
         ),
     ))
-}
-
-/// The folder in which the boards of this user lie.
-pub fn boards_folder() -> PathBuf {
-    // Shared memory rather than the temporary directory: three times faster to set up, and gone after a power loss.
-    PathBuf::from(format!("{SHARED_MEMORY}/corkboard-{}", rustix::process::getuid().as_raw()))
 }

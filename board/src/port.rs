@@ -1,8 +1,8 @@
 //! The typed ports of a service: thin checked views over bytes in shared memory.
 
-use crate::shared::{Shared, Visibility};
-use crate::transport::{Envelope, Forged, RawLoan, RawMessage, RawPublisher, RawReader, TransportError};
-use messages::{Message, Stamped, Time, View, elements_offset};
+use crate::shared::{Held, Shared, Visibility};
+use crate::transport::{Forged, RawLoan, RawMessage, RawPublisher, RawReader, TransportError};
+use messages::{Envelope, Message, Stamped, Time, View, elements_offset};
 use std::marker::PhantomData;
 use std::rc::Rc;
 use std::sync::atomic::Ordering;
@@ -74,7 +74,7 @@ impl ReaderLink {
                 None => self.receive()?,
                 Some(early) => early,
             };
-            let envelope = *message.envelope();
+            let envelope = message.envelope();
             match self.shared.visibility(Time::from_nanos(envelope.stamp_ns), envelope.round) {
                 Visibility::Now => {}
                 Visibility::Later => {
@@ -329,14 +329,6 @@ impl PublisherLink {
         }
         Ok(())
     }
-}
-
-/// A message of a step that is still being computed.
-pub(crate) struct Held {
-    topic: u32,
-    publisher: Rc<RawPublisher>,
-    bytes: Vec<u8>,
-    origin: Time,
 }
 
 /// Publishes what was held back while the step was computed, in the moment that [`Shared::begin_step`] has set.

@@ -263,7 +263,7 @@ fn serve(
 }
 
 fn open_health(joined: &mut Joined, role: &str) -> Result<Option<PublisherLink>, SetupError> {
-    let topic = host::health_topic(role);
+    let topic = messages::health_topic(role);
     if joined.manifest.topic(&topic).is_none() || joined.shared.lockstep {
         return Ok(None);
     }

@@ -9,7 +9,7 @@
 //! is an error of the call; the other leaves the owner's bits alone. For every other file both are the system
 //! call and nothing else.
 
-use crate::place;
+use crate::names::is_segment;
 use std::cell::Cell;
 use std::ffi::c_int;
 use std::os::fd::BorrowedFd;
@@ -66,7 +66,7 @@ extern "C" fn fchmod(descriptor: c_int, mode: libc::mode_t) -> c_int {
 /// The path of a descriptor that is a segment of some board.
 fn segment(descriptor: c_int) -> Option<PathBuf> {
     let path = std::fs::read_link(format!("/proc/self/fd/{descriptor}")).ok()?;
-    place::is_segment(&path).then_some(path)
+    is_segment(&path).then_some(path)
 }
 
 fn allocate(descriptor: c_int, bytes: u64) -> rustix::io::Result<()> {

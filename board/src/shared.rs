@@ -1,11 +1,11 @@
 //! What the ports of one process share: the switchboard, the moment of the present step, and the counters of its health.
 
 use crate::clock;
-use crate::port::Held;
 use crate::switchboard::{Slot, Switchboard};
-use crate::transport::TransportError;
+use crate::transport::{RawPublisher, TransportError};
 use messages::Time;
 use std::cell::{Cell, RefCell};
+use std::rc::Rc;
 use std::sync::atomic::Ordering;
 
 /// How far a stamp may lie ahead of the last look at the clock.
@@ -13,6 +13,14 @@ const FUTURE: std::time::Duration = std::time::Duration::from_millis(5);
 
 /// How often messages that cannot be sent are spoken of.
 const COMPLAINT: std::time::Duration = std::time::Duration::from_secs(1);
+
+/// A message of a step that is still being computed.
+pub(crate) struct Held {
+    pub(crate) topic: u32,
+    pub(crate) publisher: Rc<RawPublisher>,
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) origin: Time,
+}
 
 /// The state behind all ports of a node. Ports stay in their thread.
 pub(crate) struct Shared {

@@ -1,13 +1,15 @@
 //! Clears away what is left of boards whose launchers are gone.
 
-use crate::host::{HostError, SWITCHBOARD};
+use crate::host_error::HostError;
 use crate::janitor;
 use crate::lock;
-use crate::place::{self, Place, Turn};
+use crate::names::{SHARED_MEMORY, is_prefixed};
+use crate::place::{self, Place, Turn, places};
 use crate::private;
 use crate::switchboard::{self, Switchboard};
 use crate::transport::Member;
 use std::io;
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -30,7 +32,7 @@ pub fn living_launcher(place: &Place) -> io::Result<Option<u32>> {
 pub fn boards_up() -> io::Result<Vec<Place>> {
     place::check_folder()?;
     let mut up = Vec::new();
-    for place in place::places() {
+    for place in places() {
         if living_launcher(&place)?.is_some() {
             up.push(place);
         }
@@ -49,6 +51,38 @@ pub struct Swept {
     pub files: usize,
 }
 
+/// Shared memory of this user's boards that belongs to no folder and no living launcher: somebody removed the
+/// folder by hand. Ask for it under [`Turn`] only, or it may belong to a board that is being taken down.
+///
+/// # Errors
+/// When it cannot be told whether a launcher lives.
+pub fn orphans() -> io::Result<Vec<PathBuf>> {
+    let prefixes: Vec<String> = places().iter().map(|place| place.prefix().to_owned()).collect();
+    let user = rustix::process::getuid().as_raw();
+    let entries = std::fs::read_dir(SHARED_MEMORY).map_err(private::at(Path::new(SHARED_MEMORY)))?;
+    let mut orphans: Vec<PathBuf> = entries
+        .flatten()
+        .filter(|entry| {
+            let name = entry.file_name();
+            let name = name.to_string_lossy();
+            is_prefixed(&name)
+                && !prefixes.iter().any(|prefix| name.starts_with(prefix.as_str()))
+                && entry.metadata().is_ok_and(|found| found.is_file() && found.uid() == user)
+        })
+        .map(|entry| entry.path())
+        .collect();
+    if !orphans.is_empty() {
+        // A board whose folder was deleted under its launcher is no orphan: its robot may be driving.
+        let held = lock::holders()?;
+        let is_held = |file: &PathBuf| {
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            held.iter().any(|(place, _)| name.starts_with(place.prefix()))
+        };
+        orphans.retain(|file| !is_held(file));
+    }
+    Ok(orphans)
+}
+
 /// Clears away every board of this user whose launcher is gone, and says what it was.
 ///
 /// # Errors When something cannot be removed, or it cannot be told whether a launcher lives: then its board
@@ -56,12 +90,12 @@ pub struct Swept {
 pub fn sweep() -> io::Result<Vec<Swept>> {
     let _turn = Turn::take()?;
     let mut swept = Vec::new();
-    for place in place::places() {
+    for place in places() {
         if living_launcher(&place)?.is_none() {
             swept.extend(clear_away(&place)?);
         }
     }
-    let orphans = place::orphans()?;
+    let orphans = orphans()?;
     if !orphans.is_empty() {
         orphans.iter().try_for_each(|file| private::remove(file))?;
         swept.push(Swept { board: String::new(), ended: Vec::new(), files: orphans.len() });
@@ -111,7 +145,7 @@ pub(crate) fn clear_away(place: &Place) -> io::Result<Option<Swept>> {
 /// Ends the services of a board whose launcher is gone: politely first, since the base driver stops the
 /// wheels on its way out.
 fn end_services(place: &Place) -> Vec<(String, u32)> {
-    let Ok(switchboard) = Switchboard::open(&place.file(SWITCHBOARD)) else { return Vec::new() };
+    let Ok(switchboard) = Switchboard::open(&place.file(switchboard::FILE)) else { return Vec::new() };
     let living = || -> Vec<(String, u32)> {
         switchboard
             .taken()
@@ -144,7 +178,7 @@ fn end_services(place: &Place) -> Vec<(String, u32)> {
 /// Whether this process lives and has the board's page mapped: process numbers are used again, and a page
 /// that was written by a broken process must not make us end a stranger.
 fn is_of_board(pid: u32, place: &Place) -> bool {
-    let page = place.file(SWITCHBOARD);
+    let page = place.file(switchboard::FILE);
     pid != 0
         && pid != std::process::id()
         && switchboard::process_lives(pid)
@@ -173,7 +207,7 @@ pub fn clean_dead(name: &str) -> Result<usize, HostError> {
     // Those who died while they made a file leave it half made, and the transport, here and in the services,
     // waits for its end.
     let failed = janitor::beside(&place, || Member::join(&place).map(|member| member.clean()))?;
-    if let Ok(switchboard) = Switchboard::open(&place.file(SWITCHBOARD)) {
+    if let Ok(switchboard) = Switchboard::open(&place.file(switchboard::FILE)) {
         let dead: Vec<u32> = switchboard.dead_tools().map(|(index, _)| index).collect();
         dead.into_iter().for_each(|index| switchboard.release_dead(index));
     }

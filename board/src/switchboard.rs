@@ -16,6 +16,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
+/// The page, in the board's folder.
+pub(crate) const FILE: &str = "switchboard";
 /// Processes on one board at the most: services and tools.
 pub const SLOTS: usize = 128;
 /// Topics on one board at the most.

@@ -8,8 +8,8 @@ use crate::place::Place;
 use crate::port::{PublisherLink, ReaderLink};
 use crate::private::Version;
 use crate::switchboard::{SlotState, Switchboard};
-use crate::transport::{Envelope, RawMessage, TransportError};
-use messages::Time;
+use crate::transport::{RawMessage, TransportError};
+use messages::{Envelope, Message, Time, View};
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
 use std::sync::atomic::Ordering;
@@ -163,9 +163,18 @@ impl TapReader {
     pub fn next(&mut self) -> Option<(Envelope, &[u8])> {
         // A tool sees everything that is there, in lockstep too.
         let message = self.link.receive()?;
-        let envelope = *message.envelope();
+        let envelope = message.envelope();
         self.link.count_gap(envelope.sequence);
         Some((envelope, self.held.insert(message).bytes()))
+    }
+
+    /// The newest message that waits, if one does and is of that type.
+    pub fn newest<T: Message>(&mut self) -> Option<T> {
+        let mut newest = None;
+        while let Some((_, bytes)) = self.next() {
+            newest = View::<T>::parse(bytes).ok().map(|view| *view.message).or(newest);
+        }
+        newest
     }
 
     /// Messages that were overwritten before they were read, on any topic of this reader's tap.

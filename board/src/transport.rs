@@ -14,6 +14,7 @@ use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::attribute::{AttributeKey, AttributeValue};
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use messages::Envelope;
 use std::cell::Cell;
 use std::fmt;
 use std::os::unix::fs::MetadataExt as _;
@@ -21,31 +22,30 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// What lies in front of every message.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ZeroCopySend)]
-#[type_name("corkboard/Envelope/1")]
-#[repr(C)]
-pub struct Envelope {
-    /// When it was published, in nanoseconds of the board's clock.
-    pub stamp_ns: u64,
-    /// When the oldest sensor reading behind it was taken.
-    pub origin_ns: u64,
-    /// The publisher's count of messages on this topic, beginning with 1.
-    pub sequence: u64,
-    /// Which start of which publisher; a message of an older generation does not count.
-    pub generation: u32,
-    /// The round within the logical instant, in lockstep.
-    pub round: u32,
-}
-
 /// What lies in front of a message in shared memory.
 #[derive(Debug, Clone, Copy, Default, ZeroCopySend)]
-#[type_name("corkboard/Header/2")]
+#[type_name("corkboard/Header/3")]
 #[repr(C)]
 struct Header {
-    envelope: Envelope,
+    stamp_ns: u64,
+    origin_ns: u64,
+    sequence: u64,
+    generation: u32,
+    round: u32,
     /// Bytes of the message; the rest of its last block holds whatever was there before.
     length: u64,
+}
+
+impl Header {
+    fn new(envelope: Envelope, length: usize) -> Self {
+        let Envelope { stamp_ns, origin_ns, sequence, generation, round } = envelope;
+        Self { stamp_ns, origin_ns, sequence, generation, round, length: length as u64 }
+    }
+
+    fn envelope(&self) -> Envelope {
+        let Self { stamp_ns, origin_ns, sequence, generation, round, .. } = *self;
+        Envelope { stamp_ns, origin_ns, sequence, generation, round }
+    }
 }
 
 /// Alignment of every message in shared memory, in bytes.
@@ -456,8 +456,8 @@ impl RawMessage {
         if length <= size_of_val(sample.payload()) { Ok(Self { sample, length }) } else { Err(Forged) }
     }
 
-    pub(crate) fn envelope(&self) -> &Envelope {
-        &self.sample.user_header().envelope
+    pub(crate) fn envelope(&self) -> Envelope {
+        self.sample.user_header().envelope()
     }
 
     pub(crate) fn bytes(&self) -> &[u8] {
@@ -472,7 +472,7 @@ impl RawLoan {
     }
 
     pub(crate) fn send(mut self, envelope: Envelope) -> Result<(), TransportError> {
-        *self.sample.user_header_mut() = Header { envelope, length: self.length as u64 };
+        *self.sample.user_header_mut() = Header::new(envelope, self.length);
         self.sample.send().map(|_| ()).map_err(|error| failed("a message cannot be sent")(&error))
     }
 }

@@ -5,8 +5,9 @@ mod ear;
 
 pub(crate) use ear::Ear;
 
+use crate::event::Event;
 use crate::graph::{Overrides, ViewSettings};
-use crate::supervise::{Event, Phase, SwapRequest, SwapState};
+use crate::supervise::{Phase, SwapRequest, SwapState};
 use board::host;
 use board::place::Place;
 use serde::{Deserialize, Serialize};

@@ -3,7 +3,7 @@
 //! A service writes its log by itself, into a file that this thread looks at now and then: one that has grown beyond [`LOG_MAX`] becomes its own predecessor (`NAME.log.1`) and
 //! begins anew. So a service that talks without end fills neither memory nor disk, and one whose launcher is gone or stands still can still speak.
 
-use crate::supervise::Event;
+use crate::event::Event;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::os::unix::fs::OpenOptionsExt as _;

@@ -2,10 +2,11 @@
 
 use crate::console::Console;
 use crate::desk::{Desk, Face};
-use crate::graph::{Checked, Fault};
+use crate::graph::Checked;
 use crate::observer::Observer;
 use crate::play::Stage;
-use crate::prompter::{Part, Prompter};
+use crate::prompter::Prompter;
+use crate::run::{Outcome, Pace};
 use crate::runs::{self, Ended, Record};
 use crate::signals::Signals;
 use crate::summary;
@@ -13,68 +14,11 @@ use crate::supervise::Supervisor;
 use crate::up::{self, Options};
 use board::clock;
 use board::tap::Tap;
-use messages::{RunState, RunSummary, Time};
-use recording::{Digest, Recording};
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+use recording::Recording;
 use std::process::ExitCode;
 use std::time::Duration;
 
 type Failure = Box<dyn std::error::Error>;
-
-/// How a run in logical time is to be.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Pace {
-    /// Logical seconds a second; `None` for as fast as possible.
-    pub(crate) speed: Option<f64>,
-    /// Begin at this moment.
-    pub(crate) begin: Time,
-    /// End after the instant at this moment, or the first one after it, whatever the referee says.
-    pub(crate) until: Option<Time>,
-    /// Play no instant after this moment.
-    pub(crate) last: Option<Time>,
-    /// Faults beside those of the graph.
-    pub(crate) faults: Vec<Fault>,
-    /// The processor for the whole graph.
-    pub(crate) cpu: Option<usize>,
-    /// Record every message here.
-    pub(crate) record: Option<PathBuf>,
-    /// What else the recording is to say of itself.
-    pub(crate) notes: BTreeMap<String, String>,
-    /// Say these words of a recording.
-    pub(crate) script: Option<Script>,
-    /// Take orders from the standard input.
-    pub(crate) steered: bool,
-}
-
-/// What is said from a recording.
-#[derive(Debug, Clone)]
-pub(crate) struct Script {
-    /// The recording.
-    pub(crate) file: PathBuf,
-    /// The topics.
-    pub(crate) topics: Vec<String>,
-    /// What is said on them.
-    pub(crate) part: Part,
-}
-
-/// What a run in logical time has come to.
-#[derive(Debug, Clone)]
-pub(crate) struct Outcome {
-    pub(crate) verdict: Option<RunState>,
-    pub(crate) summary: Option<RunSummary>,
-    pub(crate) digest: Digest,
-    /// The last instant.
-    pub(crate) end: Time,
-    pub(crate) wall_s: f64,
-    pub(crate) turns: u64,
-    pub(crate) restarts: u32,
-    /// Faults that were ordered while it ran.
-    pub(crate) ordered: Vec<Fault>,
-    pub(crate) interrupted: bool,
-    /// What services could not leave in order at the end.
-    pub(crate) unclean: Vec<String>,
-}
 
 /// Runs a graph in logical time until its referee, the limit or a person ends it.
 ///
@@ -167,23 +111,6 @@ pub(crate) fn run(
         console.error(&format!("the end of this run is not kept in {}: {error}", folder.path().display()));
     }
     outcome
-}
-
-impl Outcome {
-    /// Whether nothing went wrong: a run that was broken off has not failed.
-    pub(crate) fn is_success(&self) -> bool {
-        self.verdict != Some(RunState::Failed) && self.unclean.is_empty()
-    }
-
-    /// Who or what ended it.
-    fn ended(&self, signals: &Signals) -> String {
-        match self.verdict {
-            Some(RunState::Passed) => "the judge has ended the run: passed".to_owned(),
-            Some(_) => "the judge has ended the run: failed".to_owned(),
-            None if self.interrupted => signals.why().to_owned(),
-            None => "the run is over: its time, or all that was to happen".to_owned(),
-        }
-    }
 }
 
 fn prompter<'a>(

@@ -11,6 +11,7 @@ mod console;
 mod control;
 mod desk;
 mod detach;
+mod event;
 mod experiment;
 mod faults;
 mod graph;
@@ -27,6 +28,7 @@ mod play;
 mod prompter;
 mod record;
 mod rerun;
+mod run;
 mod runs;
 mod shadow;
 mod signals;
@@ -103,13 +105,13 @@ fn up_command(args: &UpArgs) -> ExitCode {
         (false, false) => face(),
     };
     if args.lockstep {
-        let pace = lockstep::Pace {
+        let pace = run::Pace {
             speed: args.speed,
             until: args.until.map(messages::Time::from_secs_f64),
             cpu: args.cpu,
             record: args.record.clone(),
             steered: args.steered,
-            ..lockstep::Pace::default()
+            ..run::Pace::default()
         };
         return lockstep::up(&graph, &options, &pace, face);
     }

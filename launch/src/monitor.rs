@@ -5,10 +5,9 @@ use crate::graph::Checked;
 use crate::record::Recording;
 use crate::standstill::Standstill;
 use crate::supervise::Supervisor;
-use board::host::health_topic;
 use board::tap::{Tap, TapReader};
 use board::{JoinError, clock};
-use messages::{Health, Message, RunSummary, Time, View};
+use messages::{Health, RunSummary, Time, health_topic};
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -59,11 +58,11 @@ impl Monitor {
     /// Takes in what came since the last look.
     pub(crate) fn update(&mut self, supervisor: &Supervisor) {
         for (reader, health) in self.health.values_mut() {
-            if let Some(newest) = newest::<Health>(reader) {
+            if let Some(newest) = reader.newest::<Health>() {
                 *health = newest;
             }
         }
-        if let Some(summary) = self.finish.as_mut().and_then(newest::<RunSummary>) {
+        if let Some(summary) = self.finish.as_mut().and_then(TapReader::newest::<RunSummary>) {
             self.summary = Some(summary);
         }
         let now = clock::monotonic();
@@ -151,15 +150,6 @@ impl Monitor {
             events: supervisor.events.iter().map(Into::into).collect(),
         }
     }
-}
-
-/// The newest message that waits, if it is one.
-pub(crate) fn newest<T: Message>(reader: &mut TapReader) -> Option<T> {
-    let mut newest = None;
-    while let Some((_, bytes)) = reader.next() {
-        newest = View::<T>::parse(bytes).ok().map(|view| *view.message).or(newest);
-    }
-    newest
 }
 
 fn cpu_seconds(pid: u32) -> f64 {

@@ -18,7 +18,7 @@ const WORKSPACE: &str = include_str!("../../Cargo.toml");
 /// The form of its sources.
 const STYLE: &str = include_str!("../../rustfmt.toml");
 /// What the new service depends on, beside the board and the messages.
-const DEPENDENCIES: [&str; 3] = ["schemars", "serde", "thiserror"];
+const DEPENDENCIES: [&str; 2] = ["schemars", "serde"];
 /// Longest name, so that `health/<name>` and the like stay short enough for the transport.
 const NAME_MAX: usize = 40;
 

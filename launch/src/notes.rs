@@ -1,7 +1,7 @@
 //! What a recording says of its run, so that the run can be made again.
 
 use crate::graph::{Checked, Fault, Overrides};
-use crate::lockstep::Outcome;
+use crate::run::Outcome;
 use messages::Time;
 use recording::{Manifest, Recorder};
 use serde::{Deserialize, Serialize};

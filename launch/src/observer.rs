@@ -1,13 +1,13 @@
 //! Every message of a run in logical time, seen once: for the digest, the recording, and the referee's word.
 
 use crate::graph::Checked;
-use crate::lockstep::{Outcome, Pace};
 use crate::notes;
+use crate::run::{Outcome, Pace};
 use board::JoinError;
 use board::manifest::{Manifest, Topic};
 use board::tap::{OUTSIDE_ROUND, Tap, TapReader};
 use messages::{RunState, RunSummary, Time, View};
-use recording::{Digest, Digester, Envelope, Recorder};
+use recording::{Digest, Digester, Recorder};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -71,13 +71,6 @@ impl Observer {
     pub(crate) fn look(&mut self) -> Result<(), recording::RecordingError> {
         for (index, watched) in self.readers.iter_mut().enumerate() {
             while let Some((envelope, bytes)) = watched.reader.next() {
-                let envelope = Envelope {
-                    stamp_ns: envelope.stamp_ns,
-                    origin_ns: envelope.origin_ns,
-                    sequence: envelope.sequence,
-                    generation: envelope.generation,
-                    round: envelope.round,
-                };
                 self.digester.add(index, &envelope, bytes);
                 self.outside[index] |= envelope.round == OUTSIDE_ROUND;
                 if let Some(recorder) = &mut self.recorder {
@@ -98,8 +91,8 @@ impl Observer {
     /// When the board cannot be read, or the recording cannot be written.
     pub(crate) fn follow(&mut self) -> Result<(), ObserverError> {
         let added = self.tap.refresh()?;
-        let added: Vec<recording::Topic> =
-            self.tap.manifest().topics[added].iter().filter(|topic| is_of_a_run(topic)).map(entry).collect();
+        let added: Vec<Topic> =
+            self.tap.manifest().topics[added].iter().filter(|topic| !topic.is_health()).cloned().collect();
         for topic in added {
             if let Some(recorder) = &mut self.recorder {
                 recorder.add_topic(&topic)?;
@@ -168,25 +161,11 @@ impl Observer {
 
 /// The topics of a run as a recording lists them.
 fn of_a_run(manifest: &Manifest, notes: BTreeMap<String, String>) -> recording::Manifest {
-    let topics = manifest.topics.iter().filter(|topic| is_of_a_run(topic));
+    let topics = manifest.topics.iter().filter(|topic| !topic.is_health());
     recording::Manifest {
         graph: manifest.graph.clone(),
         seed: manifest.seed,
-        topics: topics.map(entry).collect(),
+        topics: topics.cloned().collect(),
         notes,
-    }
-}
-
-/// The health of the services speaks of the machine.
-fn is_of_a_run(topic: &Topic) -> bool {
-    !topic.name.starts_with("health/")
-}
-
-fn entry(topic: &Topic) -> recording::Topic {
-    recording::Topic {
-        name: topic.name.clone(),
-        publisher: topic.publisher.clone(),
-        depth: topic.depth,
-        message: topic.message.clone(),
     }
 }

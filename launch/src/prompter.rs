@@ -108,10 +108,7 @@ impl<'a> Prompter<'a> {
             let Some(message) = script.messages.next() else { return Ok(()) };
             let message = message.map_err(|error| error.to_string())?;
             if let Some(publisher) = &script.publishers[message.topic] {
-                let recording::Envelope { stamp_ns, origin_ns, sequence, generation, round } =
-                    message.envelope;
-                let envelope = board::Envelope { stamp_ns, origin_ns, sequence, generation, round };
-                publisher.publish_as(envelope, message.bytes()).map_err(|error| error.to_string())?;
+                publisher.publish_as(message.envelope, message.bytes()).map_err(|error| error.to_string())?;
             }
             script.skip();
         }

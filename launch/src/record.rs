@@ -1,8 +1,8 @@
 //! `launch up --record` in host time: a thread of the launcher that reads every topic beside the services.
 
 use crate::graph::Checked;
-use crate::lockstep::Pace;
 use crate::observer::{Observer, ObserverError};
+use crate::run::Pace;
 use board::clock;
 use board::place::Place;
 use board::tap::Tap;

@@ -11,9 +11,10 @@ use crate::console::Console;
 use crate::console::{say, say_line, warn};
 use crate::desk::Face;
 use crate::graph::{self, Checked, Overrides, Publisher, Request};
-use crate::lockstep::{self, Outcome, Pace, Script};
+use crate::lockstep;
 use crate::notes;
 use crate::prompter::Part;
+use crate::run::{Outcome, Pace, Script};
 use crate::signals::Signals;
 use crate::up::Options;
 use board::terminal::harmless;
@@ -218,14 +219,14 @@ fn alone_on_record(
 }
 
 fn first_stamp(recording: &Recording) -> Result<Time, Failure> {
-    let first = recording.in_order(|topic| !topic.name.starts_with("health/")).next().transpose()?;
+    let first = recording.in_order(|topic| !topic.is_health()).next().transpose()?;
     Ok(first.map_or(Time::ZERO, |message| Time::from_nanos(message.envelope.stamp_ns)))
 }
 
 /// The end of a run that did not end in order.
 fn last_stamp(recording: &Recording) -> Result<Time, Failure> {
     let mut last = Time::ZERO;
-    for message in recording.as_recorded(|topic| !topic.name.starts_with("health/")) {
+    for message in recording.as_recorded(|topic| !topic.is_health()) {
         last = last.max(Time::from_nanos(message?.envelope.stamp_ns));
     }
     Ok(last)
@@ -320,7 +321,7 @@ fn compared_topics(graph: &Checked, recording: &Recording, alone: Option<&Vec<St
     let recorded = recording
         .topics()
         .iter()
-        .filter(|topic| !topic.name.starts_with("health/") && is_wanted(topic.publisher.as_ref()))
+        .filter(|topic| !topic.is_health() && is_wanted(topic.publisher.as_ref()))
         .map(|topic| topic.name.clone());
     let now = graph.topics.iter().filter_map(|topic| {
         let publisher = match &topic.publisher {

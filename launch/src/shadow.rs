@@ -3,15 +3,14 @@
 use crate::cli::SwapArgs;
 use crate::console::{say, say_line};
 use crate::control::{self, Request};
-use crate::monitor::newest;
 use crate::numbers::{number, with_unit};
 use crate::signals::Signals;
 use board::clock;
-use board::host::{health_topic, shadow_role, shadow_topic};
+use board::host::{shadow_role, shadow_topic};
 use board::place::Place;
 use board::tap::{Tap, TapReader};
 use comfy_table::{CellAlignment, Table, presets};
-use messages::{Description, Health};
+use messages::{Description, Health, health_topic};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, VecDeque};
 use std::io::IsTerminal as _;
@@ -166,7 +165,7 @@ fn compare_until_the_end(args: &SwapArgs, place: &Place, role: &str) -> Result<(
             }
         }
         for (reader, health) in health.iter_mut().zip(&mut steps) {
-            *health = newest(reader).unwrap_or(*health);
+            *health = reader.newest().unwrap_or(*health);
         }
         let now = clock::monotonic();
         let over = args.length.is_some_and(|length| now.since(began) >= length);

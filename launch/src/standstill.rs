@@ -27,11 +27,11 @@ impl Standstill {
 
     /// Takes in what was said; an event when a fault lasts, and when it is over: in words, and whether it is trouble.
     pub(crate) fn look(&mut self, now: Time) -> Option<(String, bool)> {
-        if let Some(wheels) = self.wheels.as_mut().and_then(crate::monitor::newest::<AppliedWheels>) {
+        if let Some(wheels) = self.wheels.as_mut().and_then(TapReader::newest::<AppliedWheels>) {
             self.present[0] =
                 wheels.reason.get().map_or(Some("the driver gives a reason without a meaning"), of_driver);
         }
-        if let Some(clearance) = self.guard.as_mut().and_then(crate::monitor::newest::<Clearance>) {
+        if let Some(clearance) = self.guard.as_mut().and_then(TapReader::newest::<Clearance>) {
             self.present[1] =
                 clearance.reason.get().map_or(Some("the guard gives a reason without a meaning"), of_guard);
         }

@@ -6,10 +6,11 @@ pub(crate) mod pulse;
 mod strays;
 mod swap;
 
+use crate::event::Event;
 use crate::graph::{Checked, CheckedService, CheckedTopic, Overrides};
 use crate::journal::{self, Journal};
 use crate::runs::RunFolder;
-use board::host::{self, Host, HostError};
+use board::host::{Host, HostError};
 use board::manifest::{Manifest, Topic};
 use board::switchboard::SlotState;
 use board::terminal::harmless;
@@ -47,19 +48,6 @@ const LOOK_BACK: usize = 200;
 /// Between two looks at what lies in shared memory.
 const PLACE_PERIOD: Duration = Duration::from_secs(1);
 const EVENTS_KEPT: usize = 200;
-
-/// Something that the operator wants to know.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub(crate) struct Event {
-    /// Seconds since `up`.
-    pub(crate) at_s: f64,
-    /// The service, empty for the whole set.
-    pub(crate) role: String,
-    /// What happened.
-    pub(crate) text: String,
-    /// Whether something went wrong.
-    pub(crate) is_trouble: bool,
-}
 
 /// What the launcher does with a service now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -716,7 +704,7 @@ fn topic_of(topic: &CheckedTopic) -> Topic {
 
 fn health_of(role: &str) -> Topic {
     Topic {
-        name: host::health_topic(role),
+        name: messages::health_topic(role),
         publisher: Some(role.to_owned()),
         readers: Vec::new(),
         depth: 4,

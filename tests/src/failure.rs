@@ -34,7 +34,7 @@ fn last_messages(file: &Path) -> String {
         Err(error) => return format!("{error}\n"),
     };
     let mut last: BTreeMap<(String, String), VecDeque<String>> = BTreeMap::new();
-    for message in recording.as_recorded(|topic| !topic.name.starts_with("health/")).flatten() {
+    for message in recording.as_recorded(|topic| !topic.is_health()).flatten() {
         let topic = &recording.topics()[message.topic];
         let publisher = topic.publisher.clone().unwrap_or_else(|| "from outside".to_owned());
         let lines = last.entry((publisher, topic.name.clone())).or_default();

@@ -4,7 +4,7 @@ use crate::binaries::target_folder;
 use board::place::Place;
 use board::tap::Tap;
 use messages::Time;
-use recording::{Envelope, Recorder, Recording, RecordingError};
+use recording::{Recorder, Recording, RecordingError};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -75,15 +75,7 @@ fn record(place: Place, file: &Path, shared: &Shared) -> Result<(), Box<dyn std:
     let contents = recording::Manifest {
         graph: tap.manifest().graph.clone(),
         seed: tap.manifest().seed,
-        topics: topics
-            .iter()
-            .map(|topic| recording::Topic {
-                name: topic.name.clone(),
-                publisher: topic.publisher.clone(),
-                depth: topic.depth,
-                message: topic.message.clone(),
-            })
-            .collect(),
+        topics: topics.clone(),
         notes: BTreeMap::new(),
     };
     let mut readers = topics.iter().map(|topic| tap.reader(&topic.name)).collect::<Result<Vec<_>, _>>()?;
@@ -93,12 +85,7 @@ fn record(place: Place, file: &Path, shared: &Shared) -> Result<(), Box<dyn std:
         let is_over = shared.is_over.load(Ordering::Acquire);
         for (index, reader) in readers.iter_mut().enumerate() {
             while let Some((envelope, bytes)) = reader.next() {
-                let board::Envelope { stamp_ns, origin_ns, sequence, generation, round } = envelope;
-                recorder.record(
-                    index,
-                    &Envelope { stamp_ns, origin_ns, sequence, generation, round },
-                    bytes,
-                )?;
+                recorder.record(index, &envelope, bytes)?;
             }
         }
         if shared.done.load(Ordering::Acquire) != asked {

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -17,12 +18,18 @@ fn folders(path: &Path) -> Vec<PathBuf> {
 }
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut found = files(folder);
+    found.retain(|path| path.extension().is_some_and(|extension| extension == "rs"));
+    found
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).into_iter().flatten() {
         let path = entry.unwrap().path();
         if path.is_dir() && path.file_name().is_some_and(|name| name != "target") {
-            found.extend(sources(&path));
-        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.extend(files(&path));
+        } else if path.is_file() {
             found.push(path);
         }
     }
@@ -117,21 +124,41 @@ fn the_launcher_depends_on_no_service() {
     }
 }
 
+/// The crates of this house that others may know.
+const KNOWN: [&str; 8] =
+    ["board", "files", "fuzzy", "geometry", "messages", "pictures", "recording", "launch"];
+
 #[test]
-fn schemas_know_neither_board_nor_services() {
-    for (crate_name, allowed) in [
-        ("files", &[][..]),
-        ("geometry", &["files"][..]),
-        ("messages", &["geometry", "messages-derive"][..]),
-        ("pictures", &["geometry"][..]),
-    ] {
-        let inside =
-            ["board", "launch", "tests", "files", "geometry", "messages", "messages-derive", "pictures"];
-        for dependency in dependencies(&root().join("schemas").join(crate_name)) {
-            let ours = inside.contains(&dependency.as_str());
-            assert!(!ours || allowed.contains(&dependency.as_str()), "{crate_name} depends on {dependency}");
+fn every_room_knows_what_the_table_of_rooms_says() {
+    let architecture = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let rows: Vec<(&str, &str)> = architecture
+        .lines()
+        .filter_map(|line| {
+            let mut cells = line.strip_prefix("| `")?.trim_end_matches('|').split('|');
+            let room = cells.next()?.trim().trim_end_matches('`');
+            Some((room, cells.next_back()?))
+        })
+        .take_while(|(room, _)| *room != "tests")
+        .collect();
+    let folders = rows.iter().flat_map(|(room, may_know)| match room.strip_suffix("/*") {
+        Some(parent) => folders(&root().join(parent)).into_iter().map(|folder| (folder, *may_know)).collect(),
+        None => vec![(root().join(room), *may_know)],
+    });
+    let mut looked = 0;
+    for (folder, may_know) in folders {
+        let allowed: Vec<&str> = may_know.split(|letter: char| !letter.is_alphanumeric()).collect();
+        for dependency in dependencies(&folder).iter().filter(|name| KNOWN.contains(&name.as_str())) {
+            // Pictures of examples and tests are drawn anywhere.
+            let is_drawing = dependency == "pictures" && folder.starts_with(root().join("services"));
+            assert!(
+                is_drawing || allowed.contains(&dependency.as_str()),
+                "{} depends on {dependency}",
+                folder.display()
+            );
+            looked += 1;
         }
     }
+    assert!(rows.len() > 8 && looked > 60, "the table is read: {} rows, {looked} arrows", rows.len());
 }
 
 #[test]
@@ -179,6 +206,7 @@ fn every_crate_obeys_the_one_lint_table() {
             "launch",
             "tests",
             "schemas/files",
+            "schemas/fuzzy",
             "schemas/geometry",
             "schemas/messages",
             "schemas/messages/derive",
@@ -212,8 +240,11 @@ fn the_top_level_is_the_agreed_one() {
         "Cargo.toml",
         "Cargo.lock",
         "README.md",
+        "REQUIREMENTS.md",
         "ARCHITECTURE.md",
         "CHANGELOG.md",
+        "CONTRIBUTING.md",
+        "SECURITY.md",
         "LICENSE-APACHE",
         "LICENSE-MIT",
         "board",
@@ -239,4 +270,57 @@ fn the_test_in_the_readme_is_one_that_runs() {
     let test = include_str!("first.rs");
     assert!(readme.contains(&format!("```rust\n{test}```")), "the README shows another test than first.rs");
     assert!(test.lines().count() <= 25, "a first test is short");
+}
+
+/// Tags such as `COF-047`, and notes such as `note 2.6`, in a text.
+fn tags(text: &str) -> BTreeSet<String> {
+    let mut tags = BTreeSet::new();
+    for (kind, separator) in [("COF", '-'), ("NXT", '-'), ("ASN", '-'), ("X", '-'), ("note", ' ')] {
+        for (start, _) in text.match_indices(kind) {
+            let is_word = text[..start]
+                .chars()
+                .next_back()
+                .is_some_and(|before| before.is_alphanumeric() || before == '-');
+            let Some(rest) = text[start + kind.len()..].strip_prefix(separator).filter(|_| !is_word) else {
+                continue;
+            };
+            let number: String =
+                rest.chars().take_while(|letter| letter.is_ascii_digit() || *letter == '.').collect();
+            let number = number.trim_end_matches('.');
+            if number.starts_with(|first: char| first.is_ascii_digit())
+                && (separator == '-' || number.contains('.'))
+            {
+                tags.insert(format!(
+                    "{kind}{separator}{}",
+                    number.split('.').take(2).collect::<Vec<_>>().join(".")
+                ));
+            }
+        }
+    }
+    tags
+}
+
+#[test]
+fn every_tag_is_defined_and_cited() {
+    let book = fs::read_to_string(root().join("REQUIREMENTS.md")).unwrap();
+    let heads = book.lines().filter_map(|line| line.strip_prefix("- **")?.split("**").next());
+    let defined: BTreeSet<String> = heads.map(str::to_owned).collect();
+    let mut cited = BTreeSet::new();
+    for room in ["board", "launch", "schemas", "services", "tests"] {
+        for file in files(&root().join(room)) {
+            cited.extend(tags(&fs::read_to_string(&file).unwrap_or_default()));
+        }
+    }
+    for file in ["README.md", "ARCHITECTURE.md"] {
+        cited.extend(tags(&fs::read_to_string(root().join(file)).unwrap()));
+    }
+    let undefined: Vec<_> = cited.difference(&defined).collect();
+    let idle: Vec<_> = defined.difference(&cited).collect();
+    assert!(undefined.is_empty() && idle.is_empty(), "not defined: {undefined:?}; cited nowhere: {idle:?}");
+}
+
+#[test]
+fn tags_are_found() {
+    let found = tags("(COF-047, X-26); see note 2.6. XX-1 and COF-, note that 3 are none");
+    assert_eq!(found.into_iter().collect::<Vec<_>>(), ["COF-047", "X-26", "note 2.6"]);
 }

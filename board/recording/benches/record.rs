@@ -81,6 +81,8 @@ fn run(title: &str, topics: Vec<(Walk, u64)>, seconds: u64) {
         name: format!("t/{index}"),
         publisher: None,
         depth: 16,
+        readers: vec![],
+        elements: messages::ELEMENTS,
         message: walk.description.clone(),
     };
     let manifest = Manifest { topics: topics.iter().enumerate().map(topic).collect(), ..Manifest::default() };

@@ -2,13 +2,10 @@
 
 use crate::{Envelope, Message, Recording, RecordingError, Topic};
 use blake3::Hasher;
-use messages::{Description, Kind, Time, elements_offset};
+use messages::{Description, Kind, Time, elements_offset, is_health};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-
-/// The health of services speaks of the machine, not of the run.
-const HEALTH: &str = "health/";
 
 /// A hash over all messages of a run, topic by topic in their order: equal for equal runs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -52,7 +49,7 @@ impl Digester {
     pub fn digest(&self) -> Digest {
         let mut whole = Hasher::new();
         let mut topics = BTreeMap::new();
-        for (name, hasher, count) in self.topics.iter().filter(|(name, ..)| !name.starts_with(HEALTH)) {
+        for (name, hasher, count) in self.topics.iter().filter(|(name, ..)| !is_health(name)) {
             let hash = hasher.finalize();
             whole.update(name.as_bytes()).update(hash.as_bytes());
             topics.insert(name.clone(), (*count, short(&hash)));
@@ -69,7 +66,7 @@ impl Recording {
     /// When the file is damaged.
     pub fn digest(&self) -> Result<Digest, RecordingError> {
         let mut digester = Digester::new(self.topics().iter().map(|topic| topic.name.as_str()));
-        for message in self.as_recorded(|topic| !topic.name.starts_with(HEALTH)) {
+        for message in self.as_recorded(|topic| !topic.is_health()) {
             let message = message?;
             digester.add(message.topic, &message.envelope, message.bytes());
         }
@@ -133,7 +130,7 @@ impl std::fmt::Display for Difference {
 pub fn first_difference(a: &Recording, b: &Recording) -> Result<Option<Difference>, RecordingError> {
     // A topic has the same rank in both, whatever its place in the manifests.
     let rank = |name: &str| {
-        let common = !name.starts_with(HEALTH) && b.manifest().topic(name).is_some();
+        let common = !is_health(name) && b.manifest().topic(name).is_some();
         a.manifest().topic(name).filter(|_| common).map(|(index, _)| index)
     };
     let ranks = |recording: &Recording| recording.topics().iter().map(|topic| rank(&topic.name)).collect();

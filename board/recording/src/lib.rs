@@ -30,23 +30,10 @@ pub const BEGIN_NOTE: &str = "begin_ns";
 /// The note that says how many messages were lost, as a JSON object by topic.
 pub const LOST_NOTE: &str = "lost";
 
-use messages::Description;
+pub use messages::{Envelope, Topic};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-/// One topic of a recording.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Topic {
-    /// Its name.
-    pub name: String,
-    /// The service that published it; `None` when messages came from outside.
-    pub publisher: Option<String>,
-    /// How many messages could wait for a reader.
-    pub depth: usize,
-    /// The type of its messages.
-    pub message: Description,
-}
 
 /// What a recording is of: enough to build the board's topics again, and to show every message, without
 /// knowing a single type.
@@ -68,21 +55,6 @@ impl Manifest {
     pub fn topic(&self, name: &str) -> Option<(usize, &Topic)> {
         self.topics.iter().enumerate().find(|(_, topic)| topic.name == name)
     }
-}
-
-/// What lies in front of every message on the board.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Envelope {
-    /// When it was published, in nanoseconds of the board's clock.
-    pub stamp_ns: u64,
-    /// When the oldest sensor reading behind it was taken.
-    pub origin_ns: u64,
-    /// The publisher's count of messages on this topic.
-    pub sequence: u64,
-    /// Which start of which publisher.
-    pub generation: u32,
-    /// The round within the logical instant, in lockstep.
-    pub round: u32,
 }
 
 /// Why a recording cannot be written or read.

@@ -10,6 +10,8 @@ fn manifest(descriptions: Vec<Description>) -> Manifest {
         name: format!("{}/{index}", message.name.to_lowercase()),
         publisher: Some("somebody".into()),
         depth: 8,
+        readers: vec![],
+        elements: messages::ELEMENTS,
         message,
     };
     let topics = descriptions.into_iter().enumerate().map(topic).collect();
@@ -473,6 +475,8 @@ fn topics_are_compared_by_name_and_health_is_left_out() {
         name: name.into(),
         publisher: None,
         depth: 2,
+        readers: vec![],
+        elements: messages::ELEMENTS,
         message: messages::Order::description(),
     };
     let manifest = |names: &[&str]| Manifest {

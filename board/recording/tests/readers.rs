@@ -109,6 +109,8 @@ fn python_reads_every_message_type() {
         name: format!("test/{}", message.name.to_lowercase()),
         publisher: None,
         depth: 4,
+        readers: vec![],
+        elements: messages::ELEMENTS,
         message: message.clone(),
     };
     let manifest = Manifest {

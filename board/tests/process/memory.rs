@@ -2,8 +2,8 @@
 
 use crate::robot::{Robot, await_message, itself};
 use crate::services::{Count, Seen};
-use board::host::health_topic;
 use messages::Health;
+use messages::health_topic;
 use std::process::{Command, ExitCode};
 use zerocopy::IntoBytes as _;
 

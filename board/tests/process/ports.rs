@@ -2,8 +2,8 @@
 
 use crate::robot::{Robot, await_message, wait_for};
 use crate::services::{Count, PICTURE_BYTES, Seen};
-use board::host::health_topic;
 use board::tap::TapPublisher;
+use messages::health_topic;
 use messages::{Health, elements_offset};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};

@@ -1,12 +1,13 @@
 //! What the tests share: a board of their own, services on it, and waiting for what comes.
 
 use crate::services::{Count, Picture, Seen, WHICH};
-use board::host::{Host, health_topic};
+use board::host::Host;
 use board::manifest::{Manifest, Topic};
 use board::place::Place;
 use board::switchboard::SlotState;
 use board::tap::{Tap, TapReader};
 use board::{Envelope, clock};
+use messages::health_topic;
 use messages::{Health, Message};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};

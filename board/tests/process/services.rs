@@ -1,10 +1,9 @@
 //! The services that the tests start: this very binary, with an environment variable that says which.
 
 use board::{About, Node, SetupError, run};
-use messages::{Message, Parameters, Time};
+use messages::{Message, Misfit, Parameters, Time};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::convert::Infallible;
 use std::process::ExitCode;
 use std::time::Duration;
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
@@ -94,10 +93,7 @@ impl Default for Params {
 }
 
 impl Parameters for Params {
-    type Error = Infallible;
-    fn check(&self) -> Result<(), Infallible> {
-        Ok(())
-    }
+    type Error = Misfit;
 }
 
 /// Runs the service of this name.

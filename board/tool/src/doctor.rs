@@ -3,9 +3,10 @@
 use crate::connect::{self, Life, life};
 use crate::{Common, Outcome, show};
 use board::clock;
+use board::host::orphans;
 use board::host::{half_made, living_launcher, needed_bytes};
 use board::manifest::Manifest;
-use board::place::{Place, boards_folder, orphans, places};
+use board::place::{Place, boards_folder, places};
 use board::switchboard::{NO_SLOT, SlotState, Switchboard};
 use rustix::process::{Resource, getrlimit, getuid};
 use std::os::unix::fs::MetadataExt as _;

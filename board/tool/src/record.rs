@@ -3,7 +3,7 @@
 use crate::connect::{self, End, Watch};
 use crate::{Common, Outcome, output, show};
 use board::tap::{Tap, TapReader, now};
-use board::{Envelope, arguments, clock, manifest};
+use board::{arguments, clock};
 use messages::Time;
 use recording::{Manifest, Recorder, Topic};
 use serde_json::json;
@@ -48,11 +48,11 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
         }
     }
     let board = tap.manifest();
-    let chosen: Vec<&manifest::Topic> = board.topics.iter().filter(|topic| options.wants(topic)).collect();
+    let chosen: Vec<&Topic> = board.topics.iter().filter(|topic| options.wants(topic)).collect();
     let manifest = Manifest {
         graph: board.graph.clone(),
         seed: board.seed,
-        topics: chosen.iter().map(|topic| entry(topic)).collect(),
+        topics: chosen.into_iter().cloned().collect(),
         notes: [
             ("board".to_owned(), place.name().to_owned()),
             // Messages that are older lay on the board when the recording began.
@@ -72,9 +72,9 @@ pub(crate) fn run(common: &Common, options: &Options) -> Outcome {
 }
 
 impl Options {
-    fn wants(&self, topic: &manifest::Topic) -> bool {
+    fn wants(&self, topic: &Topic) -> bool {
         if self.topics.is_empty() {
-            return self.all || !topic.name.starts_with("health/");
+            return self.all || !topic.is_health();
         }
         self.topics.iter().any(|pattern| matches(pattern, &topic.name))
     }
@@ -84,15 +84,6 @@ fn matches(pattern: &str, name: &str) -> bool {
     match pattern.strip_suffix('*') {
         Some(subject) => name.starts_with(subject),
         None => pattern == name,
-    }
-}
-
-fn entry(topic: &manifest::Topic) -> Topic {
-    Topic {
-        name: topic.name.clone(),
-        publisher: topic.publisher.clone(),
-        depth: topic.depth,
-        message: topic.message.clone(),
     }
 }
 
@@ -170,7 +161,7 @@ impl Session<'_> {
                     source.lost += envelope.sequence.saturating_sub(last.saturating_add(1));
                 }
                 source.sequence = Some(envelope.sequence);
-                self.recorder.record(index, &translated(&envelope), bytes)?;
+                self.recorder.record(index, &envelope, bytes)?;
             }
         }
         Ok(found)
@@ -181,7 +172,7 @@ impl Session<'_> {
         for index in self.tap.refresh()? {
             let topic = &self.tap.manifest().topics[index];
             if self.options.wants(topic) {
-                let topic = entry(topic);
+                let topic = topic.clone();
                 self.recorder.add_topic(&topic)?;
                 self.open(topic.name)?;
             }
@@ -255,15 +246,5 @@ impl Session<'_> {
             show::note(&words);
         }
         Ok(ExitCode::SUCCESS)
-    }
-}
-
-fn translated(envelope: &Envelope) -> recording::Envelope {
-    recording::Envelope {
-        stamp_ns: envelope.stamp_ns,
-        origin_ns: envelope.origin_ns,
-        sequence: envelope.sequence,
-        generation: envelope.generation,
-        round: envelope.round,
     }
 }

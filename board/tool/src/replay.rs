@@ -111,7 +111,7 @@ fn publishers(
     let mut reasons = Vec::new();
     for topic in recording.topics() {
         let wanted = if options.topics.is_empty() {
-            !topic.name.starts_with("health/")
+            !topic.is_health()
         } else {
             options.topics.iter().any(|pattern| matches(pattern, &topic.name))
         };

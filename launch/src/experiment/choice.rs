@@ -1,8 +1,7 @@
 //! What the command line makes of an experiment: some of its variants, other seeds, a sweep, a parameter for
 //! all.
 
-use super::plan::RUNS_MAX;
-use super::refusal::PlanError;
+use super::refusal::{PlanError, RUNS_MAX};
 use crate::cli::ExperimentArgs;
 use toml::{Table, Value};
 

@@ -1,7 +1,7 @@
 //! From an experiment file to its runs.
 
 use super::choice::Choice;
-use super::refusal::PlanError;
+use super::refusal::{PlanError, RUNS_MAX};
 use crate::graph::{Overrides, hint};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,9 +10,7 @@ use toml::{Table, Value};
 
 /// What a variant is called that changes nothing.
 const UNCHANGED: &str = "as the graph is";
-/// More runs than this are a slip in the file.
-pub(super) const RUNS_MAX: usize = 100_000;
-/// The largest experiment of ours has 3 KiB.
+
 const FILE_MAX: u64 = 1 << 20;
 /// What the runs of an experiment change, in bytes, all together.
 const CHANGES_MAX: usize = 256 << 20;

@@ -2,7 +2,8 @@
 
 use files::toml::TomlError;
 
-use super::plan::RUNS_MAX;
+/// More runs than this are a slip in the file.
+pub(super) const RUNS_MAX: usize = 100_000;
 
 /// The longest excerpt of a file with its complaint, in characters.
 const EXCERPT_MAX: usize = 2000;

@@ -1,19 +1,18 @@
 //! Whether a graph can run: every binary's word against the graph's.
 
-use super::faults::Fault;
+use super::checked::{Checked, CheckedService};
 use super::file::Overrides;
-use super::paths;
+use super::paths::{self, CheckedPaths};
 use super::problem::{Problem, Problems};
-use super::schema::Schema;
-use super::settings::{Graph, LaunchSettings, ServiceTable, ViewSettings};
+use super::schema;
+use super::settings::{Graph, ServiceTable};
 use super::suggest::{nearest, quoted};
 use super::text::to_toml;
 use super::topics::{Member, connect};
 use super::tree::{Content, Entry, Node};
+use board::Interface;
 use board::switchboard::TOPICS;
-use board::{Direction, Interface};
-use messages::Description;
-use serde::{Deserialize, Serialize};
+use messages::Schema;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -47,133 +46,6 @@ pub(crate) enum QueryError {
     /// It cannot be started, crashes, or answers nonsense.
     #[error("{0}")]
     Broken(String),
-}
-
-/// A graph that can run.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct Checked {
-    /// The board's name.
-    pub(crate) name: String,
-    /// The file.
-    pub(crate) file: PathBuf,
-    /// The working directory of every service.
-    pub(crate) folder: PathBuf,
-    /// From which all randomness comes.
-    pub(crate) seed: u64,
-    /// The topic whose `RunSummary` ends the run.
-    pub(crate) finish: Option<String>,
-    /// What the live view shows.
-    pub(crate) view: ViewSettings,
-    /// The services, in the order of the file.
-    pub(crate) services: Vec<CheckedService>,
-    /// The topics, in the order of their names.
-    pub(crate) topics: Vec<CheckedTopic>,
-    /// What is done to services at logical moments.
-    pub(crate) faults: Vec<Fault>,
-    /// The graph as text, before the command line changed anything.
-    #[serde(skip)]
-    pub(crate) text: String,
-    /// What the command line changed.
-    #[serde(skip)]
-    pub(crate) overrides: Overrides,
-}
-
-/// A service that can run.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct CheckedService {
-    /// Its name in this graph.
-    pub(crate) role: String,
-    /// The binary as the graph names it.
-    pub(crate) run: String,
-    /// The binary.
-    pub(crate) binary: PathBuf,
-    /// All its parameters: its defaults, and over them what the graph gives.
-    pub(crate) parameters: Value,
-    /// What the launcher does with it.
-    pub(crate) launch: LaunchSettings,
-    /// What it says of itself with these parameters.
-    pub(crate) interface: Interface,
-}
-
-/// A topic of the graph.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct CheckedTopic {
-    /// Its name.
-    pub(crate) name: String,
-    /// Who publishes it.
-    pub(crate) publisher: Publisher,
-    /// Who reads it.
-    pub(crate) readers: Vec<Reader>,
-    /// The type of its messages.
-    pub(crate) message: Description,
-    /// The fingerprint of the type's layout, in hexadecimal.
-    pub(crate) fingerprint: String,
-    /// How many messages the deepest of its ports holds.
-    pub(crate) depth: usize,
-    /// For messages with elements: for how many there is room from the start.
-    #[serde(default)]
-    pub(crate) elements: usize,
-}
-
-/// Who publishes a topic.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Publisher {
-    /// This role.
-    Service(String),
-    /// A tool, from outside.
-    External,
-    /// Nobody; all readers can do without it.
-    Nobody,
-}
-
-impl Publisher {
-    /// The service that publishes it, if one does.
-    pub(crate) fn role(&self) -> Option<&str> {
-        match self {
-            Self::Service(role) => Some(role),
-            Self::External | Self::Nobody => None,
-        }
-    }
-}
-
-/// A reader of a topic.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Reader {
-    /// The role that reads.
-    pub(crate) role: String,
-    /// The newest message, or every one.
-    pub(crate) direction: Direction,
-    /// Whether it can do without.
-    pub(crate) required: bool,
-    /// How many messages may wait for it.
-    pub(crate) depth: usize,
-    /// Whether a message makes it take a step.
-    pub(crate) wakes: bool,
-}
-
-/// Which parameters name files, by role.
-#[derive(Debug, Clone, Default)]
-pub(super) struct CheckedPaths(Vec<(String, Vec<String>)>);
-
-impl CheckedPaths {
-    /// Those of a role.
-    pub(super) fn of_role<'a>(&'a self, role: &'a str) -> impl Iterator<Item = &'a str> {
-        let roles = self.0.iter().filter(move |(known, _)| known == role);
-        roles.flat_map(|(_, keys)| keys.iter().map(String::as_str))
-    }
-
-    /// Those of any role.
-    pub(super) fn all(&self) -> impl Iterator<Item = &str> {
-        self.0.iter().flat_map(|(_, keys)| keys.iter().map(String::as_str))
-    }
-
-    fn add(&mut self, role: &str, schema: &Value) {
-        let properties = schema.get("properties").and_then(Value::as_object);
-        let keys = properties.into_iter().flat_map(|properties| properties.keys());
-        let keys = keys.filter(|key| paths::is_path(schema, key)).cloned().collect();
-        self.0.push((role.to_owned(), keys));
-    }
 }
 
 /// Compares the graph with its binaries, on a machine with `cpus` processors. What is wrong goes to
@@ -341,26 +213,25 @@ fn choose_parameters(
     used_defaults: &mut [bool],
     problems: &mut Problems,
 ) -> Vec<Entry> {
-    let schema =
-        Schema { service: &service.role, root: &interface.parameters, defaults: &interface.defaults };
+    let known = Schema { root: &interface.parameters, defaults: &interface.defaults };
     let mut given = Vec::new();
     for entry in &service.parameters {
         let swapped = !service.run_place.source().is_file;
-        if swapped && entry.key_place.source().is_file && !schema.has(&entry.key) {
+        if swapped && entry.key_place.source().is_file && !known.has(&entry.key) {
             // The table was written for the binary that is swapped out.
             let message = format!("`{}` has no parameter `{}`, and does without", service.run, entry.key);
             problems.push(Problem::note(&entry.key_place, message, "it was written for another binary"));
             continue;
         }
         let entry = unquoted_text(entry, interface);
-        schema.check(&entry, problems);
+        schema::check(&service.role, known, &entry, problems);
         given.push(located(&entry, graph, interface));
     }
     for (entry, used) in graph.defaults.iter().zip(used_defaults) {
-        if schema.has(&entry.key) {
+        if known.has(&entry.key) {
             *used = true;
             if !given.iter().any(|own| own.key == entry.key) {
-                schema.check(entry, problems);
+                schema::check(&service.role, known, entry, problems);
                 given.push(located(entry, graph, interface));
             }
         }

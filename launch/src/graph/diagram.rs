@@ -1,6 +1,6 @@
 //! A graph as a drawing, with its legend: Mermaid and Graphviz.
 
-use super::check::{Checked, CheckedService, CheckedTopic, Publisher};
+use super::checked::{Checked, CheckedService, CheckedTopic, Publisher};
 use board::Direction;
 use std::fmt::Write as _;
 

@@ -1,7 +1,7 @@
 //! `[[fault]]`: what is done to services at logical moments.
 
+use super::keys::{refuse_key, take};
 use super::problem::{Problem, Problems};
-use super::settings::{refuse_key, take};
 use super::suggest::hint;
 use super::tree::{Content, Entry, Node, Table};
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,7 @@
 //! From a file's name to one table: includes, and what the command line changes.
 
 use super::find::find_included;
+use super::paths::shown;
 use super::problem::{Problem, Problems};
 use super::settings::{Graph, read_graph};
 use super::source::{Place, Source};
@@ -82,15 +83,6 @@ fn read(path: &Path, source: &Arc<Source>, overrides: &Overrides, problems: &mut
     apply(overrides, &mut table, problems);
     let graph = read_graph(path, source, &table, problems)?;
     Some(Graph { written, ..graph })
-}
-
-/// A path as people would type it: relative to the current folder if it lies within.
-pub(crate) fn shown(path: &Path) -> String {
-    let inside =
-        std::env::current_dir().ok().and_then(|here| path.strip_prefix(here).ok().map(Path::to_owned));
-    let path = inside.unwrap_or_else(|| path.to_owned());
-    let path = path.strip_prefix(".").unwrap_or(&path);
-    if path.as_os_str().is_empty() { ".".to_owned() } else { path.display().to_string() }
 }
 
 struct Reader<'a> {

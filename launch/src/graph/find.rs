@@ -1,6 +1,6 @@
 //! Graphs by name.
 
-use super::file::shown;
+use super::paths::shown;
 use super::suggest::nearest;
 use std::path::{Path, PathBuf};
 

@@ -1,11 +1,34 @@
 //! Paths count from the file in which they are written: those of an included file from its folder, all others
 //! (also those of the command line) from the graph's.
 
-use super::check::CheckedPaths;
 use super::source::Place;
 use super::tree::{Content, Entry, Table};
 use serde_json::Value;
 use std::path::{Component, Path, PathBuf};
+
+/// Which parameters name files, by role.
+#[derive(Debug, Clone, Default)]
+pub(super) struct CheckedPaths(Vec<(String, Vec<String>)>);
+
+impl CheckedPaths {
+    /// Those of a role.
+    pub(super) fn of_role<'a>(&'a self, role: &'a str) -> impl Iterator<Item = &'a str> {
+        let roles = self.0.iter().filter(move |(known, _)| known == role);
+        roles.flat_map(|(_, keys)| keys.iter().map(String::as_str))
+    }
+
+    /// Those of any role.
+    pub(super) fn all(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().flat_map(|(_, keys)| keys.iter().map(String::as_str))
+    }
+
+    pub(super) fn add(&mut self, role: &str, schema: &Value) {
+        let properties = schema.get("properties").and_then(Value::as_object);
+        let keys = properties.into_iter().flat_map(|properties| properties.keys());
+        let keys = keys.filter(|key| is_path(schema, key)).cloned().collect();
+        self.0.push((role.to_owned(), keys));
+    }
+}
 
 /// A path as services in the graph's folder find it; `None` when it is so already.
 pub(super) fn rebased(text: &str, place: &Place, graph_folder: &Path) -> Option<String> {
@@ -66,6 +89,15 @@ fn from(here: &Path, there: &Path) -> PathBuf {
     }
     let way = up.map(|_| Component::ParentDir).chain(down).collect::<PathBuf>();
     if here.is_absolute() && there.is_absolute() { way } else { there.to_owned() }
+}
+
+/// A path as people would type it: relative to the current folder if it lies within.
+pub(crate) fn shown(path: &Path) -> String {
+    let inside =
+        std::env::current_dir().ok().and_then(|here| path.strip_prefix(here).ok().map(Path::to_owned));
+    let path = inside.unwrap_or_else(|| path.to_owned());
+    let path = path.strip_prefix(".").unwrap_or(&path);
+    if path.as_os_str().is_empty() { ".".to_owned() } else { path.display().to_string() }
 }
 
 #[cfg(test)]

@@ -168,11 +168,6 @@ impl Problems {
         self.more > 0 || self.list.iter().any(|problem| problem.severity == Severity::Error)
     }
 
-    /// How many there are, errors and notes alike.
-    pub(crate) fn len(&self) -> usize {
-        self.list.len() + self.more
-    }
-
     /// Errors beyond those listed.
     pub(crate) fn more(&self) -> usize {
         self.more

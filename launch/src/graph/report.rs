@@ -2,10 +2,12 @@
 
 use super::binaries::{Installed, processors, services_in_checkout};
 use super::build::build;
-use super::check::{Checked, check};
+use super::check::check;
+use super::checked::Checked;
 use super::diagram::{dot, mermaid};
-use super::file::{Overrides, load, load_text, shown};
+use super::file::{Overrides, load, load_text};
 use super::find::find;
+use super::paths::shown;
 use super::problem::{Palette, Problem, Problems, Severity};
 use super::settings::Graph;
 use super::source::Source;

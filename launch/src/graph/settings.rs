@@ -1,12 +1,11 @@
 //! What the tables of a graph file mean to the launcher.
 
 use super::faults::{Fault, read_faults};
-use super::file::shown;
+use super::keys::{refuse_key, take};
 use super::log_level;
-use super::paths;
+use super::paths::{self, shown};
 use super::problem::{Problem, Problems};
 use super::source::{Place, Source};
-use super::suggest::hint;
 use super::tree::{Content, Entry, Node, Table};
 use board::switchboard::SLOTS;
 use serde::{Deserialize, Serialize};
@@ -573,24 +572,4 @@ fn milliseconds(entry: &Entry, value: &Node, problems: &mut Problems) -> Option<
     let number = value.number().filter(|number| (0.0..=86_400_000.0).contains(number));
     take(number, entry, "milliseconds, not negative", problems)
         .map(|number| Duration::from_secs_f64(number * 1e-3))
-}
-
-/// The value, or a problem that says what the key takes.
-pub(super) fn take<T>(value: Option<T>, entry: &Entry, wanted: &str, problems: &mut Problems) -> Option<T> {
-    if value.is_none() && !entry.value.is_nonsense() {
-        let written = entry.value.place.text();
-        let message = if written.is_empty() || written.contains('\n') || entry.value.table().is_some() {
-            format!("`{}` takes {wanted}", entry.key)
-        } else {
-            format!("`{}` takes {wanted}, not {written}", entry.key)
-        };
-        problems.push(Problem::error(&entry.value.place, message, "write such a value, or remove the line"));
-    }
-    value
-}
-
-pub(super) fn refuse_key(entry: &Entry, table: &str, known: &[&str], problems: &mut Problems) {
-    let message = format!("{table} has no key `{}`", entry.key);
-    let help = hint(&entry.key, known.iter().copied(), "its keys");
-    problems.push(Problem::error(&entry.key_place, message, help));
 }

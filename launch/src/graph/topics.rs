@@ -1,13 +1,14 @@
 //! Who publishes, who reads, and whether they speak of the same thing.
 
-use super::check::{CheckedTopic, Publisher, Reader};
+use super::checked::{CheckedTopic, Publisher, Reader};
 use super::problem::{Problem, Problems};
 use super::settings::{Graph, ServiceTable};
 use super::source::Place;
 use super::suggest::{nearest, quoted};
-use board::manifest::ELEMENTS;
 use board::{Direction, Interface, PortDescription};
-use messages::{Clearance, Message as _, MissionStatus, Path, PoseEstimate, RunSummary, WorldTruth};
+use messages::{
+    Clearance, ELEMENTS, Message as _, MissionStatus, Path, PoseEstimate, RunSummary, WorldTruth,
+};
 use std::collections::BTreeMap;
 
 /// A service of the graph with what its binary says of itself.

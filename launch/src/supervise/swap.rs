@@ -322,7 +322,7 @@ impl Supervisor {
 
     /// The topics on which a role speaks often, with when it last did.
     fn spoken_topics(&self, role: &str, now: Time) -> Vec<Taken> {
-        let health = board::host::health_topic(role);
+        let health = messages::health_topic(role);
         let topics = self.host.manifest().topics.iter().zip(0_u32..);
         let taken = |topic: u32| {
             let entry = self.host.switchboard().topic(topic)?;

@@ -12,7 +12,7 @@ use ratatui::text::Span;
 use ratatui::widgets::Block;
 use ratatui::widgets::canvas::{Canvas, Circle, Context, Line, Points};
 
-/// The coffee robot from above (COF-034): half its length and half its width.
+/// The coffee robot from above (COF-003): half its length and half its width.
 const HALF_LENGTH_M: f64 = 0.305;
 const HALF_WIDTH_M: f64 = 0.255;
 /// Half the width of a person.

@@ -4,7 +4,6 @@ use super::keys::Choice;
 use super::snapshot::{BodyMark, Scene, Snapshot};
 use crate::control::Status;
 use crate::graph::ViewSettings;
-use crate::monitor::newest;
 use board::place::Place;
 use board::tap::{Tap, TapReader};
 use geometry::Pose2;
@@ -94,22 +93,22 @@ impl Readers {
 
 impl SceneState {
     fn update(&mut self, readers: &mut Readers) {
-        self.mission = readers.mission.as_mut().and_then(newest).or(self.mission);
-        self.clearance = readers.clearance.as_mut().and_then(newest).or(self.clearance);
-        self.summary = readers.summary.as_mut().and_then(newest).or(self.summary);
+        self.mission = readers.mission.as_mut().and_then(TapReader::newest).or(self.mission);
+        self.clearance = readers.clearance.as_mut().and_then(TapReader::newest).or(self.clearance);
+        self.summary = readers.summary.as_mut().and_then(TapReader::newest).or(self.summary);
         if let Some(reader) = &mut readers.truth
             && let Some((truth, bodies)) = newest_with_elements::<WorldTruth>(reader)
         {
             self.take_truth(&truth, &bodies);
         }
-        if let Some(truth) = readers.true_pose.as_mut().and_then(newest::<TruePose>) {
+        if let Some(truth) = readers.true_pose.as_mut().and_then(TapReader::newest::<TruePose>) {
             self.has_truth = true;
             self.move_robot(
                 truth.floor,
                 Pose2 { x_m: truth.x_m, y_m: truth.y_m, heading_rad: truth.heading_rad },
             );
         }
-        if let Some(estimate) = readers.pose.as_mut().and_then(newest::<PoseEstimate>) {
+        if let Some(estimate) = readers.pose.as_mut().and_then(TapReader::newest::<PoseEstimate>) {
             self.scene.estimate = estimate.pose().ok();
             if let (false, Some(pose)) = (self.has_truth, self.scene.estimate) {
                 self.move_robot(estimate.floor, pose);

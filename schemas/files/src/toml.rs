@@ -59,7 +59,6 @@ pub fn parse<T: DeserializeOwned>(text: &str) -> Result<T, TomlError> {
 }
 
 /// Reads a TOML document with the places of its values: what could be read, and every mistake.
-#[expect(clippy::disallowed_methods, reason = "here its depth is known")]
 pub fn parse_recoverable(text: &str) -> Result<(Spanned<DeTable<'_>>, Vec<TomlError>), TomlError> {
     check_depth(text)?;
     let (table, errors) = DeTable::parse_recoverable(text);

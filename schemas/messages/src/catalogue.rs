@@ -57,7 +57,9 @@ mod tests {
         let mut names = Vec::new();
         for file in std::fs::read_dir(folder).unwrap() {
             let path = file.unwrap().path();
-            if path.file_name().is_some_and(|name| name == "tests.rs" || name == "catalogue.rs") {
+            if path.is_dir()
+                || path.file_name().is_some_and(|name| name == "tests.rs" || name == "catalogue.rs")
+            {
                 continue;
             }
             let text = std::fs::read_to_string(path).unwrap();

@@ -29,7 +29,7 @@ pub struct Order {
 }
 
 crate::state! {
-    /// Where a delivery stands (companions 2.4).
+    /// Where a delivery stands (note 2.4).
     DeliveryStatus, DeliveryStatusName {
         /// Waiting for an order.
         Idle = 0,

@@ -17,6 +17,7 @@ mod text;
 mod time;
 
 mod coffee;
+mod contract;
 mod drive;
 mod elevator;
 mod health;
@@ -27,6 +28,7 @@ mod motion;
 mod plan;
 mod range;
 mod safety;
+mod schema;
 mod sightings;
 mod sonar;
 mod summary;
@@ -38,6 +40,7 @@ mod tests;
 
 pub use catalogue::catalogue;
 pub use coffee::*;
+pub use contract::{ELEMENTS, Envelope, Topic, health_of, health_topic, is_health};
 pub use drive::*;
 pub use elevator::*;
 pub use health::*;
@@ -46,13 +49,16 @@ pub use json::JsonError;
 pub use kind::{Description, Field, FieldDescription, Kind, unit_of};
 pub use location::*;
 pub use map::*;
-pub use message::{Element, InvalidMessage, Message, NoElement, Stamped, View, elements_offset};
+pub use message::{
+    Element, InvalidMessage, Message, MessageId, NoElement, Once, Stamped, View, elements_offset,
+};
 pub use messages_derive::Message;
 pub use motion::*;
 pub use params::Parameters;
 pub use plan::*;
 pub use range::*;
 pub use safety::*;
+pub use schema::{Bounds, Fault, Misfit, Schema, Step};
 pub use sightings::*;
 pub use sonar::*;
 pub use summary::*;

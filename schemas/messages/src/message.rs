@@ -130,6 +130,11 @@ impl<'a, T: Message> Stamped<'a, T> {
         Self { stamp, origin: stamp, sequence: 0, message, elements }
     }
 
+    /// Which message this is.
+    pub fn id(self) -> MessageId {
+        MessageId { stamp: self.stamp, sequence: self.sequence }
+    }
+
     /// The message if it was published no longer than `max_age` ago, and not farther ahead than that either: a stamp from the far future
     /// would stay fresh for ever.
     pub fn fresh(self, now: Time, max_age: std::time::Duration) -> Option<Self> {
@@ -141,6 +146,41 @@ impl<T: Message> std::ops::Deref for Stamped<'_, T> {
     type Target = T;
     fn deref(&self) -> &T {
         self.message
+    }
+}
+
+/// What tells a message from all others of its topic: when it was published, and the publisher's count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct MessageId {
+    /// When it was published.
+    pub stamp: Time,
+    /// The publisher's count; a successor counts anew.
+    pub sequence: u64,
+}
+
+/// Lets each message through once. A step is given the newest message of a topic whenever anything is new, so it
+/// sees one message many times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Once {
+    last: Option<MessageId>,
+}
+
+impl Once {
+    /// The message, unless it is the one that was let through last.
+    pub fn take<'a, T: Message>(&mut self, message: Stamped<'a, T>) -> Option<Stamped<'a, T>> {
+        let is_new = self.is_new(&message);
+        self.last = Some(message.id());
+        is_new.then_some(message)
+    }
+
+    /// Whether [`take`](Self::take) would let it through.
+    pub fn is_new<T: Message>(&self, message: &Stamped<'_, T>) -> bool {
+        self.last != Some(message.id())
+    }
+
+    /// Which one was let through last.
+    pub fn last(&self) -> Option<MessageId> {
+        self.last
     }
 }
 

@@ -9,7 +9,7 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 pub const TOF_COUNT: usize = 8;
 
 crate::state! {
-    /// What a VL53L1X says of a reading: the range status codes of its interface (companions 2.1).
+    /// What a VL53L1X says of a reading: the range status codes of its interface (note 2.1).
     RangeStatus, RangeStatusName {
         /// Valid.
         Valid = 0,
@@ -55,7 +55,7 @@ const fn mount(x_m: f64, y_m: f64, heading_rad: f64) -> Pose2 {
     Pose2 { x_m, y_m, heading_rad }
 }
 
-/// One reading of a time-of-flight sensor, judged by its status (companions 2.1, X-23, X-27).
+/// One reading of a time-of-flight sensor, judged by its status (note 2.1, X-23, X-27).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reading {
     /// A distance in metres; a target nearer than the minimum reads as 0.040.
@@ -167,7 +167,7 @@ impl RangeScan {
     }
 }
 
-/// How many anchors a tag reading can hold. A DWM1001 uses four at once (companions 2.3).
+/// How many anchors a tag reading can hold. A DWM1001 uses four at once (note 2.3).
 pub const ANCHOR_CAPACITY: usize = 8;
 
 /// The distance to one anchor.

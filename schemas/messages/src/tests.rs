@@ -147,3 +147,19 @@ proptest::proptest! {
         proptest::prop_assert!(cut.get().is_some());
     }
 }
+
+#[test]
+fn a_message_is_let_through_once() {
+    let zero = AppliedWheels::default();
+    let message = |ns, sequence| Stamped { sequence, ..Stamped::new(Time::from_nanos(ns), &zero) };
+    let mut once = Once::default();
+    assert_eq!(once.last(), None);
+    assert!(once.take(message(5, 1)).is_some());
+    assert!(once.take(message(5, 1)).is_none());
+    // Two within one tick of the clock, and a successor that counts anew, are others.
+    assert!(once.is_new(&message(5, 2)));
+    assert!(once.take(message(5, 2)).is_some());
+    assert!(once.take(message(6, 2)).is_some());
+    assert!(once.take(message(5, 1)).is_some(), "only the last one is known");
+    assert_eq!(once.last(), Some(message(5, 1).id()));
+}

@@ -17,8 +17,8 @@ pub use params::{Params, ParamsError};
 use areas::{Areas, Spot};
 use geometry::{angle, world::World};
 use messages::{
-    Clearance, Face, GuardReasonName, HeadingCorrection, Odometry, Parameters, PoseEstimate, Reading, Side,
-    Stamped, Time, TofRanges,
+    Clearance, Face, GuardReasonName, HeadingCorrection, Odometry, Once, Parameters, PoseEstimate, Reading,
+    Side, Stamped, Time, TofRanges,
 };
 use std::collections::VecDeque;
 
@@ -76,7 +76,7 @@ pub struct AngleCorrection {
     areas: Areas,
     run: Option<Run>,
     /// Stamp and sequence of the last frame.
-    frame: Option<(Time, u64)>,
+    frame: Once,
 }
 
 impl AngleCorrection {
@@ -95,7 +95,7 @@ impl AngleCorrection {
     /// When the parameters make no sense.
     pub fn with_world(params: Params, world: &World) -> Result<Self, ParamsError> {
         params.check()?;
-        Ok(Self { areas: Areas::new(world, &params), params, run: None, frame: None })
+        Ok(Self { areas: Areas::new(world, &params), params, run: None, frame: Once::default() })
     }
 
     /// Looks at the newest frame and pose. Call it for every message of either.
@@ -103,7 +103,7 @@ impl AngleCorrection {
         let Some((ranges, spot, side, angle_rad)) = self.measure(now, &inputs) else {
             return Outputs { correction: self.run.take().map(|run| ended(&run)) };
         };
-        let frame = (ranges.stamp, ranges.sequence);
+        let is_new = self.frame.is_new(&ranges);
         let turned = inputs.odometry.and_then(|odometry| odometry.fresh(now, self.params.ranges_max_age()));
         let turned_rad = turned.and_then(|odometry| Some(odometry.pose().ok()?.heading_rad));
         let steadied = turned_rad.is_some();
@@ -115,10 +115,10 @@ impl AngleCorrection {
             .is_some_and(|run| run.spot == spot && run.side == side && run.steadied == steadied);
         if entering {
             self.run = Some(Run { spot, side, steadied, angles_rad: VecDeque::new(), outliers: 0 });
-        } else if self.frame == Some(frame) {
+        } else if !is_new {
             return Outputs { correction: None };
         }
-        self.frame = Some(frame);
+        self.frame.take(ranges);
         let sigma_rad = wall_angle_sigma_rad(angle_rad, self.params.range_sigma_m);
         let Some(run) = &mut self.run else { return Outputs { correction: None } };
         run.add(sample_rad, sigma_rad, self.params.window_frames as usize);

@@ -1,7 +1,7 @@
 //! What can be adjusted.
 
 use geometry::world::WorldError;
-use messages::{Parameters, TofRanges};
+use messages::Parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -79,18 +79,9 @@ impl Params {
 /// Parameters that make no sense.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of its range.
-    #[error("{name} = {value} lies outside of {min} to {max}; choose a value within")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest value.
-        min: f64,
-        /// Largest value.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// An average that needs more frames than it may hold.
     #[error("window_frames = {window_frames} is below averaged_frames = {averaged_frames}; widen the window")]
     NarrowWindow {
@@ -107,25 +98,7 @@ pub enum ParamsError {
 impl Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("door_margin_m", self.door_margin_m, TofRanges::SIDE_BASE_M + 0.1, 3.0),
-            ("half_hallway_m", self.half_hallway_m, 0.05, 4.0),
-            ("averaged_frames", f64::from(self.averaged_frames), 1.0, 25.0),
-            ("window_frames", f64::from(self.window_frames), 1.0, 500.0),
-            ("correct_from_rad", self.correct_from_rad, 0.0, 1.5),
-            ("range_sigma_m", self.range_sigma_m, 0.0001, 0.1),
-            ("mounting_sigma_rad", self.mounting_sigma_rad, 0.0, 0.2),
-            ("obstacle_m", self.obstacle_m, 0.0, 4.0),
-            ("ranges_max_age_ms", self.ranges_max_age_ms as f64, 10.0, 5000.0),
-            ("location_max_age_ms", self.location_max_age_ms as f64, 10.0, 10_000.0),
-        ];
-        for (name, value, min, max) in ranges {
-            // Written so that NaN is refused.
-            if !(min..=max).contains(&value) {
-                return Err(ParamsError::OutOfRange { name, value, min, max });
-            }
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         let (window_frames, averaged_frames) = (self.window_frames, self.averaged_frames);
         if window_frames < averaged_frames {
             return Err(ParamsError::NarrowWindow { window_frames, averaged_frames });

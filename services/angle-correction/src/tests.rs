@@ -384,8 +384,11 @@ fn check_refused(params: Params, words: &str) {
 
 #[test]
 fn parameters_that_make_no_sense_are_refused() {
-    check_refused(Params { half_hallway_m: f64::NAN, ..Params::default() }, "half_hallway_m = NaN");
-    check_refused(Params { door_margin_m: 0.1, ..Params::default() }, "door_margin_m = 0.1");
+    check_refused(
+        Params { half_hallway_m: f64::NAN, ..Params::default() },
+        "`half_hallway_m` is not a finite number",
+    );
+    check_refused(Params { door_margin_m: 0.1, ..Params::default() }, "`door_margin_m` is 0.1");
     check_refused(
         Params { window_frames: 3, ..Params::default() },
         "window_frames = 3 is below averaged_frames = 5",

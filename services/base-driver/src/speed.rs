@@ -8,7 +8,7 @@ use messages::{Clearance, WheelSpeeds};
 const ASIDE_M: f64 = 0.03;
 
 /// The speed from which a robot that first goes on for `reaction_s` and then loses `deceleration` stops within `way_m`:
-/// v·t + v²/2a = way (companions 2.5).
+/// v·t + v²/2a = way (note 2.5).
 pub(crate) fn fastest_mps(way_m: f64, reaction_s: f64, deceleration_m_per_s2: f64) -> f64 {
     let lost_mps = deceleration_m_per_s2 * reaction_s;
     (lost_mps * lost_mps + 2.0 * deceleration_m_per_s2 * way_m.max(0.0)).sqrt() - lost_mps

@@ -40,8 +40,8 @@ use geometry::Pose2;
 use laser::Scan;
 use memory::{Memory, Motion};
 use messages::{
-    Clearance, Face, GuardReasonName, KeptSighting, NearPoint, Odometry, Parameters, PoseEstimate, RangeScan,
-    Reading, Stamped, TOF_COUNT, Time, TofRanges, Verdict,
+    Clearance, Face, GuardReasonName, KeptSighting, NearPoint, Odometry, Once, Parameters, PoseEstimate,
+    RangeScan, Reading, Stamped, TOF_COUNT, Time, TofRanges, Verdict,
 };
 use near::Near;
 use serde::{Deserialize, Serialize};
@@ -124,7 +124,9 @@ pub struct CollisionAvoidance {
     memory: Memory,
     near: Near,
     /// Stamp and sequence of the last frame, and when it was taken.
-    frame: Option<(Time, u64, Time)>,
+    frame: Once,
+    /// When the newest frame was taken.
+    taken: Option<Time>,
     /// Whether GO was ever said.
     confirmed: bool,
     verdict: Verdict,
@@ -150,7 +152,8 @@ impl CollisionAvoidance {
             params,
             eyes: Eyes::default(),
             memory: Memory::default(),
-            frame: None,
+            frame: Once::default(),
+            taken: None,
             confirmed: false,
             verdict: Verdict::Stop,
             changes: 0,
@@ -219,9 +222,7 @@ impl CollisionAvoidance {
     /// Whether a frame was not seen before. One stamped farther ahead of now than readings may be old has no meaning and is not
     /// taken: it would never grow stale.
     fn is_new<T: messages::Message>(&self, now: Time, frame: &Stamped<'_, T>) -> bool {
-        let seen =
-            self.frame.is_some_and(|(stamp, sequence, _)| (stamp, sequence) == (frame.stamp, frame.sequence));
-        !seen && frame.stamp.since(now) <= self.params.max_age()
+        self.frame.is_new(frame) && frame.stamp.since(now) <= self.params.max_age()
     }
 
     fn motion(&self, now: Time, odometry: Option<Stamped<'_, Odometry>>) -> Option<Motion> {
@@ -232,7 +233,8 @@ impl CollisionAvoidance {
 
     fn take_tof(&mut self, now: Time, ranges: Stamped<'_, TofRanges>, motion: Option<Motion>) {
         let taken = ranges.stamp.min(ranges.origin);
-        self.frame = Some((ranges.stamp, ranges.sequence, taken));
+        self.frame.take(ranges);
+        self.taken = Some(taken);
         self.eyes.take(now, ranges.message, motion);
         let mut readings_m = [None; TOF_COUNT];
         for (sensor, reading_m) in readings_m.iter_mut().enumerate() {
@@ -251,7 +253,8 @@ impl CollisionAvoidance {
 
     fn take_scan(&mut self, now: Time, message: Stamped<'_, RangeScan>, motion: Option<Motion>) {
         let taken = message.stamp.min(message.origin);
-        self.frame = Some((message.stamp, message.sequence, taken));
+        self.frame.take(message);
+        self.taken = Some(taken);
         let scan = Scan::of(&message);
         let faces = scan.as_ref().map_or([None; 3], |scan| scan.faces(&self.params));
         for (channel, reading_m) in faces.into_iter().enumerate() {
@@ -306,7 +309,7 @@ impl CollisionAvoidance {
     }
 
     fn reason(&self, now: Time, violated: u32) -> GuardReasonName {
-        let Some((_, _, taken)) = self.frame else { return GuardReasonName::Start };
+        let Some(taken) = self.taken else { return GuardReasonName::Start };
         if now.since(taken) > self.params.max_age() {
             return GuardReasonName::Stale;
         }

@@ -149,18 +149,9 @@ pub enum ParamsError {
     /// The world file cannot be used.
     #[error("world: {0}")]
     World(#[from] WorldError),
-    /// A number outside of its range.
-    #[error("{name} = {value} lies outside of {min} to {max}; choose a value within")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest value.
-        min: f64,
-        /// Largest value.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// A radius that no time-of-flight reading can violate (X-27).
     #[error(
         "{name} = {radius_m} is not above the sensors' smallest reading of {minimum_m} m, so no obstacle could ever violate it; \
@@ -200,35 +191,16 @@ pub enum ParamsError {
 impl Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("front_radius_m", self.front_radius_m, 0.0, 4.0),
-            ("right_radius_m", self.right_radius_m, 0.0, 4.0),
-            ("left_radius_m", self.left_radius_m, 0.0, 4.0),
-            ("max_age_ms", self.max_age_ms as f64, 10.0, 5000.0),
-            ("scatter_max_ms", self.scatter_max_ms as f64, 50.0, 60_000.0),
-            ("blind_way_m", self.blind_way_m, 0.0, 100.0),
-            ("heartbeat_ms", self.heartbeat_ms as f64, 5.0, 1000.0),
-            ("clear_frames", f64::from(self.clear_frames), 1.0, 100.0),
-            ("memory_m", self.memory_m, 0.0, 4.0),
-            ("memory_jump_m", self.memory_jump_m, 0.02, 2.0),
-            ("memory_release_s", self.memory_release_s, 0.0, 60.0),
-            ("standstill_mps", self.standstill_mps, 0.0, 0.2),
-            ("hull_front_m", self.hull_front_m, 0.01, 5.0),
-            ("hull_rear_m", self.hull_rear_m, 0.01, 5.0),
-            ("hull_side_m", self.hull_side_m, 0.01, 5.0),
-            ("laser_margin_m", self.laser_margin_m, 0.0, 1.0),
-        ];
-        for (name, value, min, max) in ranges {
-            // Written so that NaN is refused.
-            if !(min..=max).contains(&value) {
-                return Err(ParamsError::OutOfRange { name, value, min, max });
-            }
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         let minimum_m = TofRanges::MINIMUM_M;
-        for (name, radius_m, ..) in &ranges[..3] {
-            if self.sensor == Sensor::Tof && *radius_m as f32 <= minimum_m {
-                return Err(ParamsError::RadiusBelowSensor { name, radius_m: *radius_m, minimum_m });
+        let radii = [
+            ("front_radius_m", self.front_radius_m),
+            ("right_radius_m", self.right_radius_m),
+            ("left_radius_m", self.left_radius_m),
+        ];
+        for (name, radius_m) in radii {
+            if self.sensor == Sensor::Tof && radius_m as f32 <= minimum_m {
+                return Err(ParamsError::RadiusBelowSensor { name, radius_m, minimum_m });
             }
         }
         if self.memory_m > 0.0 && self.memory_m < self.front_radius_m {

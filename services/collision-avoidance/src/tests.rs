@@ -109,7 +109,7 @@ fn a_radius_of_100_mm_everywhere_never_starts_beside_the_wall() {
     check_steady(Params::default(), beside_the_wall, Verdict::Go);
 }
 
-/// COF-065 and companions 2.5: at 0.36 m/s, 0.5 m/s² and frames of 0.1 s a robot stops within 200 mm, and not within 50 mm.
+/// COF-065 and note 2.5: at 0.36 m/s, 0.5 m/s² and frames of 0.1 s a robot stops within 200 mm, and not within 50 mm.
 #[test]
 fn a_radius_of_50_mm_everywhere_hits_the_obstacle() {
     let gap_left_m = |params: Params| {
@@ -494,13 +494,13 @@ fn check_refused(change: impl FnOnce(&mut Params), words: &str) {
 
 #[test]
 fn parameters_that_make_no_sense_are_refused() {
-    check_refused(|p| p.front_radius_m = f64::NAN, "front_radius_m = NaN");
+    check_refused(|p| p.front_radius_m = f64::NAN, "`front_radius_m` is not a finite number");
     check_refused(|p| p.front_radius_m = 0.03, "front_radius_m = 0.03 is not above");
     check_refused(|p| p.left_radius_m = 0.04, "left_radius_m = 0.04 is not above");
     check_refused(|p| p.memory_m = 0.1, "memory_m = 0.1 is below front_radius_m = 0.2");
     check_refused(|p| p.heartbeat_ms = 400, "heartbeat_ms = 400 is above max_age_ms = 300");
-    check_refused(|p| p.clear_frames = 0, "clear_frames = 0");
-    check_refused(|p| p.max_age_ms = 0, "max_age_ms = 0");
+    check_refused(|p| p.clear_frames = 0, "`clear_frames` is 0");
+    check_refused(|p| p.max_age_ms = 0, "`max_age_ms` is 0");
     Params { memory_m: 0.0, ..Params::default() }.check().unwrap();
 }
 

@@ -9,12 +9,12 @@ mod params;
 #[cfg(test)]
 mod tests;
 
-pub use params::{Params, ParamsError};
+pub use params::Params;
 
 use geometry::Pose2;
 use messages::{
     Clearance, CurrentState, DeliveryStatus, DeliveryStatusName, DriveCommand, DriveModeName, GuardSignal,
-    HeadingCorrection, MissionStatus, MoveInstruction, MoveInstructionName, Parameters, PoseEstimate,
+    HeadingCorrection, Misfit, MissionStatus, MoveInstruction, MoveInstructionName, Parameters, PoseEstimate,
     RoomName, Stamped, Time, Verdict,
 };
 use std::time::Duration;
@@ -71,7 +71,7 @@ impl CurrentStateService {
     ///
     /// # Errors
     /// When the parameters make no sense.
-    pub fn new(params: Params) -> Result<Self, ParamsError> {
+    pub fn new(params: Params) -> Result<Self, Misfit> {
         params.check()?;
         Ok(Self { params, place: None, located: false, angle: None, mission: None, published: None })
     }

@@ -1,6 +1,6 @@
 //! What can be adjusted.
 
-use messages::Parameters;
+use messages::{Misfit, Parameters};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -36,36 +36,6 @@ impl Params {
     }
 }
 
-/// Parameters that make no sense.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ParamsError {
-    /// A number outside of its range.
-    #[error("{name} = {value} lies outside of {min} to {max}; choose a value within")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: u64,
-        /// Smallest value.
-        min: u64,
-        /// Largest value.
-        max: u64,
-    },
-}
-
 impl Parameters for Params {
-    type Error = ParamsError;
-
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("period_ms", self.period_ms, 5, 10_000),
-            ("location_max_age_ms", self.location_max_age_ms, 10, 60_000),
-            ("angle_max_age_ms", self.angle_max_age_ms, 10, 60_000),
-            ("clearance_max_age_ms", self.clearance_max_age_ms, 10, 5000),
-        ];
-        match ranges.into_iter().find(|(_, value, min, max)| !(min..=max).contains(&value)) {
-            Some((name, value, min, max)) => Err(ParamsError::OutOfRange { name, value, min, max }),
-            None => Ok(()),
-        }
-    }
+    type Error = Misfit;
 }

@@ -162,7 +162,10 @@ fn it_speaks_at_each_change_and_ten_times_a_second() {
 #[test]
 fn parameters_that_make_no_sense_are_refused() {
     let error = CurrentStateService::new(Params { period_ms: 0, ..Params::default() }).unwrap_err();
-    assert_eq!(error.to_string(), "period_ms = 0 lies outside of 5 to 10000; choose a value within");
+    assert_eq!(
+        error.to_string(),
+        "`period_ms` is 0 ms, which is out of range: it must be from 5 to 10000 ms; the default is 100"
+    );
 }
 
 fn message<T: FromBytes>(bytes: &[u8]) -> T {

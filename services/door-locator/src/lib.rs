@@ -1,6 +1,6 @@
 //! Finds the door beside the robot, and how far ahead its centre line is: a door reads about 100 mm deeper than the wall. Source: the
 //! coffee robot's paper, sections III.C, IV.C and V.C (COF-100 to COF-112), with the gaps settled in X-25 (side and gate by the map)
-//! and X-26 (window by speed), and the detector of companions 2.6.
+//! and X-26 (window by speed), and the detector of note 2.6.
 //!
 //! Two detectors look at the same readings. The paper's sliding window fires when the robot is at the door or almost past it
 //! (COF-104, COF-111). The finer one locates the door's edges along the wall, by odometry, for each sensor of the side: wall, then
@@ -27,8 +27,8 @@ use estimate::{Edges, Lag};
 use geometry::{Pose2, world::World};
 use hallway::{Hallway, Station};
 use messages::{
-    DoorSighting, DoorState, MissionStatus, Odometry, Parameters, PoseEstimate, Reading, RoomName, Side,
-    Stamped, Time, TofRanges,
+    DoorSighting, DoorState, MissionStatus, Odometry, Once, Parameters, PoseEstimate, Reading, RoomName,
+    Side, Stamped, Time, TofRanges,
 };
 use profile::{Edge, End, Profile};
 use window::Window;
@@ -95,7 +95,7 @@ pub struct DoorLocator {
     flanks: [Flank; 2],
     lag: Lag,
     sightings: u64,
-    frame: Option<(Time, u64)>,
+    frame: Once,
     /// Smoothed time between frames.
     period_s: Option<f64>,
 }
@@ -121,14 +121,14 @@ impl DoorLocator {
         let flanks = [flank(Side::Right), flank(Side::Left)];
         let doors = doors::doors(world);
         let hallway = Hallway::default();
-        Ok(Self { params, doors, hallway, flanks, lag, sightings: 0, frame: None, period_s: None })
+        Ok(Self { params, doors, hallway, flanks, lag, sightings: 0, frame: Once::default(), period_s: None })
     }
 
     /// Looks at the newest frame; one seen before is nothing new. Call it for every frame.
     pub fn step(&mut self, now: Time, inputs: Inputs<'_>) -> Outputs {
         let nothing = Outputs { sighting: None };
         let fresh = inputs.ranges.and_then(|ranges| ranges.fresh(now, self.params.max_age()));
-        let Some(ranges) = fresh.filter(|ranges| self.frame != Some((ranges.stamp, ranges.sequence))) else {
+        let Some(ranges) = fresh.filter(|ranges| self.frame.is_new(ranges)) else {
             return nothing;
         };
         self.count_time(&ranges);
@@ -161,12 +161,12 @@ impl DoorLocator {
     }
 
     fn count_time(&mut self, ranges: &Stamped<'_, TofRanges>) {
-        if let Some((before, _)) = self.frame {
-            let step_s = ranges.stamp.seconds_since(before);
+        if let Some(before) = self.frame.last() {
+            let step_s = ranges.stamp.seconds_since(before.stamp);
             let period_s = self.period_s.unwrap_or(step_s);
             self.period_s = Some(period_s + 0.2 * (step_s - period_s));
         }
-        self.frame = Some((ranges.stamp, ranges.sequence));
+        self.frame.take(*ranges);
     }
 
     fn forget(&mut self) {

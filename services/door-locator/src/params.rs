@@ -18,7 +18,7 @@ pub struct Params {
     /// By how much the newer half of the window must be deeper than the older one (COF-104).
     #[schemars(range(min = 0.005, max = 1.0))]
     pub rise_m: f64,
-    /// A window that has fired fires again only after its newer half fell by this (companions 2.6).
+    /// A window that has fired fires again only after its newer half fell by this (note 2.6).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub unlock_m: f64,
     /// Half of the window holds at least so many readings.
@@ -52,7 +52,7 @@ pub struct Params {
     /// Standard deviation of that guess.
     #[schemars(range(min = 0.001, max = 0.5))]
     pub edge_lag_sigma_ratio: f64,
-    /// The second sensor sees the same edge after the sensors' distance, give or take this share of it (companions 2.6).
+    /// The second sensor sees the same edge after the sensors' distance, give or take this share of it (note 2.6).
     #[schemars(range(min = 0.05, max = 1.0))]
     pub confirm_share: f64,
     /// The robot stands at the entrance when the door's centre line is within this.
@@ -116,18 +116,9 @@ impl Params {
 /// Parameters that make no sense.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of its range.
-    #[error("{name} = {value} lies outside of {min} to {max}; choose a value within")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest value.
-        min: f64,
-        /// Largest value.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// A window whose smallest size is its largest.
     #[error("half_window_max = {max} is below half_window_min = {min}; raise half_window_max")]
     NoWindow {
@@ -144,32 +135,7 @@ pub enum ParamsError {
 impl Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("rise_m", self.rise_m, 0.005, 1.0),
-            ("unlock_m", self.unlock_m, 0.0, 1.0),
-            ("half_window_min", f64::from(self.half_window_min), 1.0, 64.0),
-            ("half_window_max", f64::from(self.half_window_max), 1.0, 1024.0),
-            ("noise_m", self.noise_m, 0.1, 4.0),
-            ("gate_m", self.gate_m, 0.1, 10.0),
-            ("edge_m", self.edge_m, 0.01, 0.5),
-            ("recess_tolerance_m", self.recess_tolerance_m, 0.01, 0.5),
-            ("edge_readings", f64::from(self.edge_readings), 3.0, 20.0),
-            ("edge_run_m", self.edge_run_m, 0.0, 0.4),
-            ("edge_lag_ratio", self.edge_lag_ratio, 0.0, 0.5),
-            ("edge_lag_sigma_ratio", self.edge_lag_sigma_ratio, 0.001, 0.5),
-            ("confirm_share", self.confirm_share, 0.05, 1.0),
-            ("entrance_m", self.entrance_m, 0.01, 1.0),
-            ("standstill_mps", self.standstill_mps, 0.001, 0.2),
-            ("max_age_ms", self.max_age_ms as f64, 10.0, 5000.0),
-            ("location_max_age_ms", self.location_max_age_ms as f64, 10.0, 10_000.0),
-        ];
-        for (name, value, min, max) in ranges {
-            // Written so that NaN is refused.
-            if !(min..=max).contains(&value) {
-                return Err(ParamsError::OutOfRange { name, value, min, max });
-            }
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         if self.half_window_max < self.half_window_min {
             return Err(ParamsError::NoWindow { min: self.half_window_min, max: self.half_window_max });
         }

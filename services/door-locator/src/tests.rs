@@ -214,7 +214,7 @@ fn the_window_must_fit_the_speed() {
     assert_eq!(fires(30, &after_wall(60, &gradual)).len(), 1);
 }
 
-/// COF-110 and companions 2.6.
+/// COF-110 and note 2.6.
 #[test]
 fn noise_is_an_open_door() {
     assert_eq!(fires(4, &after_wall(8, &[2000.0, 9999.0, 1500.0, 3000.0])), [9]);
@@ -334,7 +334,7 @@ fn final_words(pass: &Pass) -> (Said, DoorSighting) {
     (said, last)
 }
 
-/// COF-046, companions 2.6: confidence grows, and the record names the door.
+/// COF-046, note 2.6: confidence grows, and the record names the door.
 #[test]
 fn a_sighting_tells_everything_about_the_door() {
     let (said, last) = final_words(&Pass::default());
@@ -434,8 +434,8 @@ fn check_refused(params: Params, words: &str) {
 
 #[test]
 fn parameters_that_make_no_sense_are_refused() {
-    check_refused(Params { rise_m: f64::NAN, ..Params::default() }, "rise_m = NaN");
-    check_refused(Params { edge_readings: 2, ..Params::default() }, "edge_readings = 2");
+    check_refused(Params { rise_m: f64::NAN, ..Params::default() }, "`rise_m` is not a finite number");
+    check_refused(Params { edge_readings: 2, ..Params::default() }, "`edge_readings` is 2");
     check_refused(
         Params { half_window_min: 9, half_window_max: 8, ..Params::default() },
         "half_window_max = 8",

@@ -1,4 +1,4 @@
-//! The paper's detector: a sliding window whose newer half is compared with its older half (COF-102 to COF-112, companions 2.6).
+//! The paper's detector: a sliding window whose newer half is compared with its older half (COF-102 to COF-112, note 2.6).
 
 use crate::Params;
 use std::collections::VecDeque;

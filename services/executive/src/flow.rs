@@ -211,7 +211,7 @@ impl Executive {
     fn locate(&mut self, now: Time, scans: u64, since: Time) -> bool {
         let is_new = self.belief.is_some_and(|belief| belief.scans > scans);
         // A cloud of that very moment may have been shown before the scan was weighed.
-        let is_shown = self.cloud_stamp.is_some_and(|stamp| stamp > since);
+        let is_shown = self.cloud.last().is_some_and(|cloud| cloud.stamp > since);
         if !(is_new && is_shown) {
             return self.keep(now, Task::Locating { scans, since });
         }
@@ -254,7 +254,7 @@ impl Executive {
 
     /// The direction in which the body can drive farthest, and how far it should.
     fn open_space(&self) -> Option<(f64, f64)> {
-        let (_, seen) = self.seen.as_ref()?;
+        let seen = self.seen.as_ref()?;
         let margin_m = self.params.turn_margin_m;
         let way_m = |turn_rad: f64| {
             let heading = Pose2::new(0.0, 0.0, turn_rad);
@@ -419,7 +419,7 @@ impl Executive {
                 |place: &resolve::Hypothesis| View { arena: &self.arena, pose: place.pose.compose(moved) };
             return self.places.hypotheses.iter().map(view).collect();
         }
-        self.seen.iter().map(|(_, arena)| View { arena, pose: moved(self.seen_at) }).collect()
+        self.seen.iter().map(|arena| View { arena, pose: moved(self.seen_at) }).collect()
     }
 
     /// Room that is wanted around the body: more where less is known.

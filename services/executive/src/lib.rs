@@ -16,9 +16,9 @@ use arena::Arena;
 use flow::{Count, Task};
 use geometry::{Point2, Polygon, Pose2, World};
 use messages::{
-    FixedText, JourneyStageName, JourneyStatus, LocationStateName, MotionCommand, MotionReport, Parameters,
-    Particle, ParticleCloud, Path, PlanRequest, PoseEstimate, RangeScan, SonarCommand, Stamped, Time,
-    WallSurvey,
+    FixedText, JourneyStageName, JourneyStatus, LocationStateName, MotionCommand, MotionReport, Once,
+    Parameters, Particle, ParticleCloud, Path, PlanRequest, PoseEstimate, RangeScan, SonarCommand, Stamped,
+    Time, WallSurvey,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -66,14 +66,16 @@ pub struct Executive {
     /// The newest pose, whether it is certain or not.
     belief: Option<Belief>,
     /// What the newest scan has shown, in the frame of the robot then.
-    seen: Option<(Time, Arena)>,
+    seen: Option<Arena>,
+    /// The scan that it shows.
+    scan: Once,
     /// The belief's pose when that scan was taken, or weighed.
     seen_at: Pose2,
     /// The belief's pose when `places` were found.
     placed_at: Pose2,
     /// Where it may be.
     places: resolve::Places,
-    cloud_stamp: Option<Time>,
+    cloud: Once,
     /// Since when the robot waits for another service.
     waits_since: Option<Time>,
     /// Whether the robot has come to the end of a path.
@@ -125,9 +127,8 @@ impl Executive {
     pub fn in_world(params: Params, world: &World, seed: u64) -> Result<Self, ParamsError> {
         params.check()?;
         let (length_m, width_m) = (params.body_length_m, params.body_width_m);
-        let out_of_range =
-            ParamsError::OutOfRange { name: "body_length_m", value: length_m, min: 0.02, max: 2.0 };
-        let footprint = Polygon::rectangle(length_m, width_m).map_err(|_| out_of_range)?;
+        let footprint =
+            Polygon::rectangle(length_m, width_m).map_err(|_| ParamsError::NoBody { length_m, width_m })?;
         let arena = Arena::of_world(world, footprint.clone());
         let target = Self::find_target(&params, world, &arena, seed)?;
         Ok(Self {
@@ -139,10 +140,11 @@ impl Executive {
             task: Task::Waiting,
             belief: None,
             seen: None,
+            scan: Once::default(),
             seen_at: Pose2::IDENTITY,
             placed_at: Pose2::IDENTITY,
             places: resolve::Places::default(),
-            cloud_stamp: None,
+            cloud: Once::default(),
             waits_since: None,
             at_end: false,
             detours: 0,
@@ -188,16 +190,10 @@ impl Executive {
         if let Some(pose) = inputs.pose {
             self.believe(&pose);
         }
-        if let Some(raw) = inputs.raw
-            && self.seen.as_ref().is_none_or(|(stamp, _)| *stamp != raw.stamp)
-        {
-            let arena = Arena::of_scan(raw.message, raw.elements, self.footprint.clone());
-            self.seen = arena.map(|arena| (raw.stamp, arena));
+        if let Some(raw) = inputs.raw.and_then(|raw| self.scan.take(raw)) {
+            self.seen = Arena::of_scan(raw.message, raw.elements, self.footprint.clone());
         }
-        if let Some(cloud) = inputs.cloud
-            && self.cloud_stamp != Some(cloud.stamp)
-        {
-            self.cloud_stamp = Some(cloud.stamp);
+        if let Some(cloud) = inputs.cloud.and_then(|cloud| self.cloud.take(cloud)) {
             let elements: &[Particle] = cloud.elements;
             self.places = resolve::Places::of_cloud(cloud.message, elements);
             let alike = cloud.places().iter().filter(|place| place.share > ALIKE_SHARE).count();

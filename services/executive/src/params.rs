@@ -67,7 +67,7 @@ pub struct Params {
     /// How far the robot may drive back from a wall that is too near.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub retreat_m: f64,
-    /// How far the robot drives towards open space where no better way is found to tell places apart (companions 1.6).
+    /// How far the robot drives towards open space where no better way is found to tell places apart (note 1.6).
     #[schemars(range(min = 0.01, max = 1.0))]
     pub open_space_m: f64,
     /// How far from the target a path may end.
@@ -115,17 +115,16 @@ impl Default for Params {
 /// Why parameters of the executive are refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of what is possible.
-    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest possible value.
-        min: f64,
-        /// Largest possible value.
-        max: f64,
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
+    /// A hull that is none.
+    #[error("body_length_m = {length_m} and body_width_m = {width_m} make no hull")]
+    NoBody {
+        /// Its length.
+        length_m: f64,
+        /// Its width.
+        width_m: f64,
     },
     /// The target does not exist.
     #[error("the world {world:?} has no [[place]] named {target:?}; add one, or set random_target = true")]
@@ -159,33 +158,4 @@ impl Params {
 
 impl messages::Parameters for Params {
     type Error = ParamsError;
-
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("target_clearance_m", self.target_clearance_m, 0.0, 2.0),
-            ("aim_clearance_m", self.aim_clearance_m, 0.0, 2.0),
-            ("aim_shift_m", self.aim_shift_m, 0.0, 1.0),
-            ("close_enough_m", self.close_enough_m, 0.001, 1.0),
-            ("max_rounds", self.max_rounds.into(), 1.0, 100.0),
-            ("max_scans", self.max_scans.into(), 2.0, 10_000.0),
-            ("body_length_m", self.body_length_m, 0.02, 2.0),
-            ("body_width_m", self.body_width_m, 0.02, 2.0),
-            ("turn_margin_m", self.turn_margin_m, 0.0, 0.5),
-            ("scan_margin_m", self.scan_margin_m, 0.0, 0.5),
-            ("way_margin_m", self.way_margin_m, 0.0, 0.5),
-            ("way_sigmas", self.way_sigmas, 0.0, 6.0),
-            ("shortest_way_m", self.shortest_way_m, 0.01, 2.0),
-            ("heading_tolerance_rad", self.heading_tolerance_rad, 0.0, 0.5),
-            ("face_wall_from_m", self.face_wall_from_m, 0.0, 1.0),
-            ("retreat_m", self.retreat_m, 0.0, 1.0),
-            ("open_space_m", self.open_space_m, 0.01, 1.0),
-            ("goal_tolerance_m", self.goal_tolerance_m, 0.0, 0.1),
-            ("patience_s", self.patience_s, 0.1, 60.0),
-            ("period_ms", self.period_ms.into(), 5.0, 1000.0),
-        ];
-        match ranges.iter().find(|(_, value, min, max)| !(min..=max).contains(&value)) {
-            Some(&(name, value, min, max)) => Err(ParamsError::OutOfRange { name, value, min, max }),
-            None => Ok(()),
-        }
-    }
 }

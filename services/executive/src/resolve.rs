@@ -1,7 +1,7 @@
 //! Where to drive when several places look alike: active localisation (after Fox et al. 1998) on a small random roadmap.
 //!
 //! Wherever the robot is, it is at one of a few poses. A way is described as seen from the robot, and must be free at nearly all of them; it
-//! is the better, the more the scans at its end would differ from pose to pose, and the shorter it is (companions 1.6 step 6).
+//! is the better, the more the scans at its end would differ from pose to pose, and the shorter it is (note 1.6 step 6).
 
 use crate::arena::Arena;
 use geometry::{Point2, Pose2};

@@ -1,7 +1,7 @@
 //! Obstacle distances in the three cones of the avoidance controller, from whatever sensors there are.
 //!
 //! Left 30 to 50 degrees, front -30 to 30, right -50 to -30 (ASN-143), as clearances from the hull. What lies beside the
-//! cones, from 50 to 110 degrees, counts for left and right with a stretched clearance (X-38, companions 3.7).
+//! cones, from 50 to 110 degrees, counts for left and right with a stretched clearance (X-38, note 3.7).
 
 use crate::params::Params;
 use messages::{RangeScan, Reading, Time, TofRanges};

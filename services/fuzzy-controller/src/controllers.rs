@@ -1,8 +1,8 @@
 //! The three fuzzy controllers, each an FCL file that an experimenter edits.
 
-use crate::fuzzy::{Engine, EngineError, Options, System, fcl};
 use crate::params::{Params, ParamsError};
 use files::FileError;
+use fuzzy::{Engine, EngineError, Options, System, fcl};
 use std::path::Path;
 
 /// A rule file of a thousand rules has 100 KiB.

@@ -1,5 +1,5 @@
 //! Drives to waypoints and around obstacles by fuzzy rules: the paper's FLMC with its three controllers MM, OAM and CSM
-//! (ASN-140 to ASN-149, companions 3.6 to 3.8), whose rules are FCL files. The engine that runs them is in [`fuzzy`].
+//! (ASN-140 to ASN-149, note 3.6 to 3.8), whose rules are FCL files. The engine that runs them is in [`fuzzy`].
 //!
 //! Who decides, first to last: bad or stale input stops; something close ahead brakes, and then the robot only turns; something near
 //! is avoided; a close target to the side is turned to; else the robot drives to it.
@@ -7,7 +7,6 @@
 mod clearance;
 mod controllers;
 mod course;
-pub mod fuzzy;
 mod params;
 mod surround;
 #[cfg(test)]
@@ -95,7 +94,7 @@ pub struct Outputs {
     pub distance_m: f64,
     /// Where the robot will be after one period by its kinematics (ASN-148).
     pub predicted: Option<Pose2>,
-    /// The robot avoids and avoids and comes no further: a new path is needed (companions 3.8).
+    /// The robot avoids and avoids and comes no further: a new path is needed (note 3.8).
     pub blocked: bool,
 }
 
@@ -278,7 +277,7 @@ impl FuzzyController {
         Some(clearances).filter(|clearances| clearances.is_usable())
     }
 
-    /// The arbitration of companions 3.8, from its second rule on.
+    /// The arbitration of note 3.8, from its second rule on.
     fn follow(&mut self, inputs: &Inputs<'_>, request: u64, pose: Pose2, clearances: Clearances) -> Decision {
         let found =
             |path: &Stamped<'_, Path>| path.request_id == request && path.state == PlanStateName::Found;
@@ -348,7 +347,7 @@ impl FuzzyController {
         steady
     }
 
-    /// The speed from which the robot stops before it must brake (companions 2.5), and never less than a creep.
+    /// The speed from which the robot stops before it must brake (note 2.5), and never less than a creep.
     fn speed_before_mps(&self, front_m: f64) -> f64 {
         let room_m = (front_m - self.params.brake_distance_m).max(0.0);
         let (brake, latency) = (self.params.brake_mps2, self.params.latency_s);

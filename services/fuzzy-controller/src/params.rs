@@ -1,4 +1,4 @@
-//! The parameters of the fuzzy controller; their defaults are those of a PowerBot (companions 3.1, 3.6 to 3.8).
+//! The parameters of the fuzzy controller; their defaults are those of a PowerBot (note 3.1, 3.6 to 3.8).
 
 use messages::Parameters;
 use schemars::JsonSchema;
@@ -95,7 +95,7 @@ pub struct Params {
     /// No motion brings the hull nearer than this to what the time-of-flight sensors saw a moment ago; 0 does not look.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub keep_away_m: f64,
-    /// Deceleration of the drive, for the speed ahead of obstacles (companions 2.5).
+    /// Deceleration of the drive, for the speed ahead of obstacles (note 2.5).
     #[schemars(range(min = 0.01, max = 20.0))]
     pub brake_mps2: f64,
     /// Time from a reading to the wheels.
@@ -104,10 +104,10 @@ pub struct Params {
     /// By how much clearances beside the laser cones, from 50 to 110 degrees, are stretched.
     #[schemars(range(min = 1.0, max = 10.0))]
     pub lateral_factor: f64,
-    /// This near to the goal there is no avoidance (companions 3.7).
+    /// This near to the goal there is no avoidance (note 3.7).
     #[schemars(range(min = 0.0, max = 10.0))]
     pub goal_without_avoidance_m: f64,
-    /// Avoidance for longer than this without progress is reported as blocked (companions 3.8).
+    /// Avoidance for longer than this without progress is reported as blocked (note 3.8).
     #[schemars(range(min = 100, max = 3600000))]
     pub blocked_after_ms: u64,
     /// What counts as progress.
@@ -191,17 +191,18 @@ impl Params {
 /// What is wrong with the parameters.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside its limits.
-    #[error("{name} = {value} must lie from {low} to {high}")]
-    OutOfRange {
-        /// The parameter.
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
+    /// A speed that the wheels do not reach.
+    #[error("{name} = {speed_mps} is above top_speed_mps = {top_mps}; lower the first")]
+    AboveTopSpeed {
+        /// The speed.
         name: &'static str,
         /// Its value.
-        value: f64,
-        /// The least it may be.
-        low: f64,
-        /// The most it may be.
-        high: f64,
+        speed_mps: f64,
+        /// The top speed.
+        top_mps: f64,
     },
     /// Two that must differ in this order do not.
     #[error("{small_name} = {small} must be below {large_name} = {large}")]
@@ -220,42 +221,12 @@ pub enum ParamsError {
 impl Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let pi = std::f64::consts::PI;
-        for (name, value, low, high) in [
-            ("track_m", self.track_m, 0.05, 5.0),
-            ("top_speed_mps", self.top_speed_mps, 0.01, 5.0),
-            ("rules_top_speed_mps", self.rules_top_speed_mps, 0.01, 5.0),
-            ("acceleration_mps2", self.acceleration_mps2, 0.01, 20.0),
-            ("period_ms", self.period_ms as f64, 1.0, 1000.0),
-            ("input_max_age_ms", self.input_max_age_ms as f64, 1.0, 10_000.0),
-            ("command_max_age_ms", self.command_max_age_ms as f64, 1.0, 3_600_000.0),
-            ("reach_tolerance_m", self.reach_tolerance_m, 0.005, 2.0),
-            ("pass_distance_m", self.pass_distance_m, 0.01, 2.0),
-            ("lookahead_m", self.lookahead_m, 0.0, 5.0),
-            ("rotation_distance_m", self.rotation_distance_m, 0.0, 10.0),
-            ("rotation_begin_rad", self.rotation_begin_rad, 0.01, pi),
-            ("rotation_end_rad", self.rotation_end_rad, 0.005, pi),
-            ("rotation_always_rad", self.rotation_always_rad, 0.01, pi),
-            ("rotation_least_mps", self.rotation_least_mps, 0.0, self.top_speed_mps),
-            ("turn_tolerance_rad", self.turn_tolerance_rad, 0.002, 1.0),
-            ("creep_speed_mps", self.creep_speed_mps, 0.005, self.top_speed_mps),
-            ("front_trigger_m", self.front_trigger_m, 0.01, 10.0),
-            ("side_trigger_m", self.side_trigger_m, 0.01, 10.0),
-            ("brake_distance_m", self.brake_distance_m, 0.0, 10.0),
-            ("keep_away_m", self.keep_away_m, 0.0, 1.0),
-            ("brake_mps2", self.brake_mps2, 0.01, 20.0),
-            ("latency_s", self.latency_s, 0.0, 5.0),
-            ("lateral_factor", self.lateral_factor, 1.0, 10.0),
-            ("goal_without_avoidance_m", self.goal_without_avoidance_m, 0.0, 10.0),
-            ("blocked_after_ms", self.blocked_after_ms as f64, 100.0, 3_600_000.0),
-            ("progress_m", self.progress_m, 0.01, 10.0),
-            ("hull_front_m", self.hull_front_m, 0.01, 5.0),
-            ("hull_rear_m", self.hull_rear_m, 0.01, 5.0),
-            ("hull_side_m", self.hull_side_m, 0.01, 5.0),
-        ] {
-            if !(low..=high).contains(&value) {
-                return Err(ParamsError::OutOfRange { name, value, low, high });
+    fn check_together(&self) -> Result<(), ParamsError> {
+        for (name, speed_mps) in
+            [("rotation_least_mps", self.rotation_least_mps), ("creep_speed_mps", self.creep_speed_mps)]
+        {
+            if speed_mps > self.top_speed_mps {
+                return Err(ParamsError::AboveTopSpeed { name, speed_mps, top_mps: self.top_speed_mps });
             }
         }
         for (small_name, small, large_name, large) in [

@@ -58,7 +58,7 @@ struct World {
     smallest_clearance_m: f64,
 }
 
-/// The radius of the robot of companions 3.7.
+/// The radius of the robot of note 3.7.
 const ROBOT_RADIUS_M: f64 = 0.36;
 
 impl World {
@@ -425,8 +425,8 @@ fn check_refused(params: Params, words: &str) {
 
 #[test]
 fn bad_setup_is_refused() {
-    check_refused(Params { track_m: 0.0, ..params() }, "track_m = 0");
-    check_refused(Params { top_speed_mps: f64::NAN, ..params() }, "top_speed_mps = NaN");
+    check_refused(Params { track_m: 0.0, ..params() }, "`track_m` is 0");
+    check_refused(Params { top_speed_mps: f64::NAN, ..params() }, "`top_speed_mps` is not a finite number");
     check_refused(
         Params { rotation_end_rad: 0.5, ..params() },
         "rotation_end_rad = 0.5 must be below rotation_begin_rad",

@@ -24,7 +24,8 @@ pub use search::{DIAGONAL, STRAIGHT, Search};
 
 use geometry::{Pose2, Segment, World};
 use messages::{
-    Parameters, Path, PlanRequest, PlanState, PlanStateName, PoseEstimate, Stamped, Time, TofRanges, Waypoint,
+    Once, Parameters, Path, PlanRequest, PlanState, PlanStateName, PoseEstimate, Stamped, Time, TofRanges,
+    Waypoint,
 };
 use overlay::Overlay;
 
@@ -68,7 +69,7 @@ pub struct GridPlanner {
     overlay: Overlay,
     /// The floor whose field holds the overlay.
     overlay_floor: Option<usize>,
-    ranges_seen: Option<Time>,
+    ranges_seen: Once,
     active: Option<Active>,
 }
 
@@ -124,7 +125,7 @@ impl GridPlanner {
             router: Router::default(),
             overlay: Overlay::default(),
             overlay_floor: None,
-            ranges_seen: None,
+            ranges_seen: Once::default(),
             active: None,
         })
     }
@@ -173,9 +174,9 @@ impl GridPlanner {
         self.overlay.fade(field, &rules, now);
         let news = ranges
             .and_then(|ranges| ranges.fresh(now, self.params.input_max_age()))
-            .filter(|ranges| self.ranges_seen.is_none_or(|seen| ranges.stamp > seen));
+            .filter(|ranges| self.ranges_seen.is_new(ranges));
         if let (Some(ranges), Some((_, pose))) = (news, pose) {
-            self.ranges_seen = Some(ranges.stamp);
+            self.ranges_seen.take(ranges);
             let leaves = self.leaves.iter().find(|(floor, _)| floor == number);
             let leaves = leaves.map_or(&[][..], |(_, leaves)| leaves.as_slice());
             self.overlay.observe((field, leaves), &rules, now, pose, ranges.message);

@@ -136,18 +136,9 @@ impl Default for Params {
 /// What can be wrong with the parameters, or with the files that they name.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// A number out of its range.
-    #[error("{name} = {value} is not within {min} to {max}: choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The least.
-        min: f64,
-        /// The most.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// Two sources of walls.
     #[error("world = \"{world}\" and map = \"{map}\" both name the walls: leave one of them empty")]
     TwoMaps {
@@ -200,35 +191,7 @@ pub enum ParamsError {
 impl messages::Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("occupancy_threshold", self.occupancy_threshold, 0.0, 1.0),
-            ("resolution_m", self.resolution_m, 0.01, 0.5),
-            ("robot_radius_m", self.robot_radius_m, 0.0, 2.0),
-            ("obstacle_margin_m", self.obstacle_margin_m, 0.0, 1.0),
-            ("keep_right_weight", self.keep_right_weight, 0.0, 10.0),
-            ("lane_m", self.lane_m, 0.1, 5.0),
-            ("hallway_width_max_m", self.hallway_width_max_m, 0.5, 10.0),
-            ("clearance_weight", self.clearance_weight, 0.0, 10.0),
-            ("clearance_m", self.clearance_m, 0.0, 5.0),
-            ("escape_m", self.escape_m, 0.0, 5.0),
-            ("waypoint_spacing_m", self.waypoint_spacing_m, 0.0, 2.0),
-            ("stray_m", self.stray_m, 0.1, 5.0),
-            ("replan_interval_s", self.replan_interval_s, 0.1, 60.0),
-            ("range_max_m", self.range_max_m, 0.1, 4.0),
-            ("half_cone_rad", self.half_cone_rad, 0.01, 0.5),
-            ("wall_tolerance_m", self.wall_tolerance_m, 0.0, 1.0),
-            ("confirm_sightings", f64::from(self.confirm_sightings), 1.0, 5.0),
-            ("obstacle_memory_s", self.obstacle_memory_s, 0.5, 600.0),
-            ("samples", f64::from(self.samples), 1.0, 10_000.0),
-            ("input_max_age_ms", self.input_max_age_ms as f64, 50.0, 10_000.0),
-            ("period_ms", self.period_ms as f64, 10.0, 1000.0),
-        ];
-        if let Some(&(name, value, min, max)) =
-            ranges.iter().find(|(_, value, min, max)| !(min..=max).contains(&value))
-        {
-            return Err(ParamsError::OutOfRange { name, value, min, max });
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         if !self.world.is_empty() && !self.map.is_empty() {
             return Err(ParamsError::TwoMaps { world: self.world.clone(), map: self.map.clone() });
         }

@@ -161,10 +161,13 @@ pub struct AnchorPlace {
     /// Its number in the log.
     pub id: u32,
     /// Place.
+    #[schemars(range(min = -1000000.0, max = 1000000.0))]
     pub x_m: f64,
     /// Place.
+    #[schemars(range(min = -1000000.0, max = 1000000.0))]
     pub y_m: f64,
     /// Height above the floor.
+    #[schemars(range(min = -1000.0, max = 1000.0))]
     pub z_m: f64,
 }
 
@@ -173,10 +176,13 @@ pub struct AnchorPlace {
 #[serde(deny_unknown_fields)]
 pub struct Pose {
     /// Place.
+    #[schemars(range(min = -1000000.0, max = 1000000.0))]
     pub x_m: f64,
     /// Place.
+    #[schemars(range(min = -1000000.0, max = 1000000.0))]
     pub y_m: f64,
     /// Direction.
+    #[schemars(range(min = -10.0, max = 10.0))]
     pub heading_rad: f64,
 }
 
@@ -224,18 +230,9 @@ impl Params {
 /// Parameters that make no sense.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of its range.
-    #[error("{name} = {value} must lie between {least} and {most}")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The smallest value allowed.
-        least: f64,
-        /// The largest value allowed.
-        most: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// Two anchors with one number.
     #[error("anchors: number {id} occurs twice; give each anchor its own")]
     AnchorTwice {
@@ -275,31 +272,7 @@ impl Params {
 impl Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let frame = self.map_in_anchor_frame;
-        let mut numbers = vec![
-            ("truth_step_offset", f64::from(self.truth_step_offset), 0.0, 1000.0),
-            ("speed", self.speed, 0.001, 100_000.0),
-            ("period_s", self.period_s, 0.001, 3600.0),
-            ("start_delay_s", self.start_delay_s, 0.0, 60.0),
-            ("tick_ms", self.tick_ms, 0.1, 1000.0),
-            ("laser_fov_rad", self.laser_fov_rad, 0.0, 6.3),
-            ("range_max_m", self.range_max_m, 0.1, 1000.0),
-            ("wheel_track_m", self.wheel_track_m, 0.01, 10.0),
-            ("map_in_anchor_frame.x_m", frame.x_m, -1e6, 1e6),
-            ("map_in_anchor_frame.y_m", frame.y_m, -1e6, 1e6),
-            ("map_in_anchor_frame.heading_rad", frame.heading_rad, -10.0, 10.0),
-        ];
-        for anchor in &self.anchors {
-            numbers.push(("anchors.x_m", anchor.x_m, -1e6, 1e6));
-            numbers.push(("anchors.y_m", anchor.y_m, -1e6, 1e6));
-            numbers.push(("anchors.z_m", anchor.z_m, -1e3, 1e3));
-        }
-        for (name, value, least, most) in numbers {
-            if !(value >= least && value <= most) {
-                return Err(ParamsError::OutOfRange { name, value, least, most });
-            }
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         if self.anchors.len() > ANCHOR_CAPACITY {
             return Err(ParamsError::TooManyAnchors { count: self.anchors.len() });
         }

@@ -220,11 +220,14 @@ fn check_refused(change: impl Fn(&mut Params), told: &str) {
 
 #[test]
 fn nonsense_parameters_are_refused() {
-    check_refused(|params| params.speed = 0.0, "speed = 0 must lie between");
-    check_refused(|params| params.speed = f64::NAN, "speed = NaN");
-    check_refused(|params| params.period_s = -1.0, "period_s = -1");
+    check_refused(
+        |params| params.speed = 0.0,
+        "`speed` is 0.0, which is out of range: it must be from 0.001",
+    );
+    check_refused(|params| params.speed = f64::NAN, "`speed` is not a finite number");
+    check_refused(|params| params.period_s = -1.0, "`period_s` is -1");
     check_refused(|params| params.anchors[1].id = 1, "number 1 occurs twice");
-    check_refused(|params| params.anchors[1].z_m = f64::INFINITY, "anchors.z_m = inf");
+    check_refused(|params| params.anchors[1].z_m = f64::INFINITY, "`anchors[1].z_m` is not a finite number");
     check_refused(|params| params.anchors = vec![params.anchors[0]; 9], "9 are more than the 8");
     check_refused(|params| params.truth = "truth.txt".to_owned(), "without a file");
 }

@@ -99,18 +99,9 @@ impl Default for Params {
 /// What can be wrong with the parameters, or with the file that they name.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// A number out of its range.
-    #[error("{name} = {value} is not within {min} to {max}: choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The least.
-        min: f64,
-        /// The most.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// The extent and the resolution make no grid.
     #[error(
         "width_m = {width_m}, height_m = {height_m}, resolution_m = {resolution_m}: {cause}; choose larger cells or a smaller extent"
@@ -136,29 +127,7 @@ pub enum ParamsError {
 impl messages::Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("save_period_s", self.save_period_s, 0.0, 3600.0),
-            ("resolution_m", self.resolution_m, 0.01, 1.0),
-            ("min_x_m", self.min_x_m, -10_000.0, 10_000.0),
-            ("min_y_m", self.min_y_m, -10_000.0, 10_000.0),
-            ("width_m", self.width_m, 0.1, 2000.0),
-            ("height_m", self.height_m, 0.1, 2000.0),
-            ("hit_probability", self.hit_probability, 0.51, 0.99),
-            ("miss_probability", self.miss_probability, 0.01, 0.49),
-            ("clamp_log_odds", self.clamp_log_odds, 0.5, 10.0),
-            ("range_max_m", self.range_max_m, 0.1, 100.0),
-            ("clear_max_m", self.clear_max_m, 0.0, 100.0),
-            ("beam_width_max_rad", self.beam_width_max_rad, 0.0001, 0.6),
-            ("pose_max_age_ms", self.pose_max_age_ms as f64, 10.0, 10_000.0),
-            ("publish_period_ms", self.publish_period_ms as f64, 50.0, 60_000.0),
-            ("period_ms", self.period_ms as f64, 10.0, 1000.0),
-        ];
-        if let Some(&(name, value, min, max)) =
-            ranges.iter().find(|(_, value, min, max)| !(min..=max).contains(&value))
-        {
-            return Err(ParamsError::OutOfRange { name, value, min, max });
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         self.frame().map(|_| ())
     }
 }

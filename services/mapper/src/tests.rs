@@ -490,9 +490,12 @@ fn check_refused(params: Params, part: &str) {
 
 #[test]
 fn bad_parameters_are_refused() {
-    check_refused(Params { resolution_m: 0.0, ..Params::default() }, "resolution_m = 0");
-    check_refused(Params { hit_probability: 0.4, ..Params::default() }, "hit_probability = 0.4");
-    check_refused(Params { miss_probability: f64::NAN, ..Params::default() }, "miss_probability = NaN");
+    check_refused(Params { resolution_m: 0.0, ..Params::default() }, "`resolution_m` is 0");
+    check_refused(Params { hit_probability: 0.4, ..Params::default() }, "`hit_probability` is 0.4");
+    check_refused(
+        Params { miss_probability: f64::NAN, ..Params::default() },
+        "`miss_probability` is not a finite number",
+    );
     check_refused(
         Params { width_m: 2000.0, height_m: 2000.0, resolution_m: 0.01, ..Params::default() },
         "choose larger cells",

@@ -77,18 +77,9 @@ impl Default for Params {
 /// Why parameters of the controller are refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of what is possible.
-    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest possible value.
-        min: f64,
-        /// Largest possible value.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// Creeping faster than driving.
     #[error("{creep_name} = {creep} is above {name} = {speed}; lower the first")]
     CreepTooFast {
@@ -130,28 +121,7 @@ impl Params {
 impl messages::Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("period_ms", self.period_ms.into(), 5.0, 100.0),
-            ("wheel_track_m", self.wheel_track_m, 0.05, 2.0),
-            ("speed_mps", self.speed_mps, 0.01, 1.0),
-            ("turn_rate_rad_per_s", self.turn_rate_rad_per_s, 0.05, 7.0),
-            ("braking_m_per_s2", self.braking_m_per_s2, 0.02, 5.0),
-            ("braking_rad_per_s2", self.braking_rad_per_s2, 0.1, 30.0),
-            ("creep_mps", self.creep_mps, 0.001, 0.1),
-            ("creep_rad_per_s", self.creep_rad_per_s, 0.005, 1.0),
-            ("tolerance_m", self.tolerance_m, 0.0, 0.02),
-            ("turn_tolerance_rad", self.turn_tolerance_rad, 0.0, 0.1),
-            ("approach_per_s", self.approach_per_s, 0.1, 20.0),
-            ("retreat_m", self.retreat_m, 0.0, 1.0),
-            ("retreat_speed_mps", self.retreat_speed_mps, 0.01, 0.3),
-            ("patience_s", self.patience_s, 0.1, 30.0),
-        ];
-        if let Some(&(name, value, min, max)) =
-            ranges.iter().find(|(_, value, min, max)| !(min..=max).contains(&value))
-        {
-            return Err(ParamsError::OutOfRange { name, value, min, max });
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         let pairs = [
             ("creep_mps", self.creep_mps, "speed_mps", self.speed_mps),
             ("creep_rad_per_s", self.creep_rad_per_s, "turn_rate_rad_per_s", self.turn_rate_rad_per_s),

@@ -139,7 +139,11 @@ fn refuses_nonsense_with_names_and_values() {
     let params = Params { creep_mps: 0.05, speed_mps: 0.02, ..Params::default() };
     assert!(params.check().is_err_and(|error| error.to_string().contains("creep_mps = 0.05")));
     let params = Params { braking_m_per_s2: f64::NAN, ..Params::default() };
-    assert!(params.check().is_err_and(|error| error.to_string().contains("braking_m_per_s2 = NaN")));
+    assert!(
+        params
+            .check()
+            .is_err_and(|error| error.to_string().contains("`braking_m_per_s2` is not a finite number"))
+    );
 }
 
 proptest! {

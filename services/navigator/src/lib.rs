@@ -1,5 +1,5 @@
 //! Serves orders for coffee: collects it in the tea room, travels, rides the elevator, halts at the door, returns; when the way is
-//! blocked it waits, backs off, plans anew and at last asks for help (COF-001, COF-005, COF-133, X-28; companions 2.4).
+//! blocked it waits, backs off, plans anew and at last asks for help (COF-001, COF-005, COF-133, X-28; note 2.4).
 
 mod building;
 mod docking;

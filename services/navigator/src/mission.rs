@@ -5,7 +5,7 @@ use crate::orders::{Job, OrderBook};
 use messages::DeliveryStatusName;
 use serde::{Deserialize, Serialize};
 
-/// The steps of a delivery (companions 2.4).
+/// The steps of a delivery (note 2.4).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stage {

@@ -58,10 +58,10 @@ pub struct Params {
     /// Speed backwards.
     #[schemars(range(min = 0.02, max = 0.5))]
     pub back_off_speed_mps: f64,
-    /// Deceleration of the drive (companions 2.5).
+    /// Deceleration of the drive (note 2.5).
     #[schemars(range(min = 0.1, max = 5.0))]
     pub brake_mps2: f64,
-    /// Time from a command to the wheels (companions 2.5).
+    /// Time from a command to the wheels (note 2.5).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub latency_s: f64,
     /// How long loading in the tea room takes.
@@ -135,18 +135,9 @@ impl Default for Params {
 /// What can be wrong with the parameters, or with the world that they name.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// A number out of its range.
-    #[error("{name} = {value} is not within {min} to {max}: choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The least.
-        min: f64,
-        /// The most.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// Two speeds in the wrong order.
     #[error(
         "crawl_speed_mps = {crawl_mps} is above creep_speed_mps = {creep_mps}: the last centimetres are driven more slowly"
@@ -175,40 +166,7 @@ pub enum ParamsError {
 impl messages::Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("arrival_tolerance_m", self.arrival_tolerance_m, 0.02, 1.0),
-            ("goal_tolerance_m", self.goal_tolerance_m, 0.0, 2.0),
-            ("approach_m", self.approach_m, 0.3, 5.0),
-            ("right_door_m", self.right_door_m, 0.3, 3.0),
-            ("left_door_m", self.left_door_m, 0.3, 3.0),
-            ("halt_tolerance_m", self.halt_tolerance_m, 0.01, 0.5),
-            ("halt_accept_m", self.halt_accept_m, 0.01, 0.5),
-            ("overrun_m", self.overrun_m, 0.1, 3.0),
-            ("sighting_gate_m", self.sighting_gate_m, 0.1, 3.0),
-            ("min_confidence", self.min_confidence, 0.0, 1.0),
-            ("travel_speed_mps", self.travel_speed_mps, 0.05, 2.0),
-            ("creep_speed_mps", self.creep_speed_mps, 0.02, 0.5),
-            ("crawl_speed_mps", self.crawl_speed_mps, 0.01, 0.2),
-            ("back_off_speed_mps", self.back_off_speed_mps, 0.02, 0.5),
-            ("brake_mps2", self.brake_mps2, 0.1, 5.0),
-            ("latency_s", self.latency_s, 0.0, 1.0),
-            ("load_s", self.load_s, 0.0, 600.0),
-            ("dwell_s", self.dwell_s, 0.0, 600.0),
-            ("blocked_after_s", self.blocked_after_s, 0.5, 60.0),
-            ("back_off_s", self.back_off_s, 0.1, 10.0),
-            ("max_failures", f64::from(self.max_failures), 1.0, 100.0),
-            ("fault_retry_s", self.fault_retry_s, 0.0, 3600.0),
-            ("pose_max_age_ms", self.pose_max_age_ms as f64, 50.0, 10000.0),
-            ("elevator_wait_m", self.elevator_wait_m, 0.3, 5.0),
-            ("elevator_timeout_s", self.elevator_timeout_s, 5.0, 600.0),
-            ("period_ms", self.period_ms as f64, 10.0, 1000.0),
-        ];
-        if let Some(&(name, value, min, max)) =
-            ranges.iter().find(|(_, value, min, max)| !(min..=max).contains(&value))
-        {
-            return Err(ParamsError::OutOfRange { name, value, min, max });
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         if self.crawl_speed_mps > self.creep_speed_mps {
             return Err(ParamsError::CrawlAboveCreep {
                 crawl_mps: self.crawl_speed_mps,

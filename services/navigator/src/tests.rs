@@ -241,7 +241,7 @@ fn check_params(change: impl Fn(&mut Params), expected: &str) {
 
 #[test]
 fn bad_parameters_are_refused() {
-    check_params(|params| params.dwell_s = f64::NAN, "dwell_s = NaN is not within 0 to 600");
+    check_params(|params| params.dwell_s = f64::NAN, "`dwell_s` is not a finite number");
     check_params(
         |params| params.crawl_speed_mps = 0.2,
         "crawl_speed_mps = 0.2 is above creep_speed_mps = 0.15",
@@ -250,7 +250,7 @@ fn bad_parameters_are_refused() {
         |params| params.halt_tolerance_m = 0.2,
         "halt_tolerance_m = 0.2 is above halt_accept_m = 0.1",
     );
-    check_params(|params| params.max_failures = 0, "max_failures = 0");
+    check_params(|params| params.max_failures = 0, "`max_failures` is 0");
     check_params(|params| params.world = "nowhere.toml".into(), "nowhere.toml");
     assert!(Navigator::new(Params::default()).is_ok());
 }

@@ -38,7 +38,7 @@ pub use weigh::Weigher;
 
 use geometry::{Pose2, angle};
 use messages::{
-    CLUSTER_CAPACITY, LocationStateName, Odometry, Parameters, Particle, ParticleCloud, PoseCluster,
+    CLUSTER_CAPACITY, LocationStateName, Odometry, Once, Parameters, Particle, ParticleCloud, PoseCluster,
     PoseEstimate, RangeScan, Stamped, Time,
 };
 
@@ -69,7 +69,7 @@ pub struct ParticleLocaliser {
     odometry: Option<Pose2>,
     /// Travelled since the last scan that was used.
     travel: Travel,
-    seen_scan: Option<(Time, u64)>,
+    seen_scan: Once,
     update: Option<Update>,
     /// Whether the pose has been found since the start, or since it was lost.
     is_found: bool,
@@ -101,7 +101,7 @@ impl ParticleLocaliser {
             params,
             odometry: None,
             travel: Travel::default(),
-            seen_scan: None,
+            seen_scan: Once::default(),
             update: None,
             is_found,
             accepted: 0,
@@ -126,10 +126,7 @@ impl ParticleLocaliser {
         if let Some(odometry) = inputs.odometry {
             self.follow(&odometry);
         }
-        if let Some(scan) = inputs.scan
-            && self.seen_scan != Some((scan.stamp, scan.sequence))
-        {
-            self.seen_scan = Some((scan.stamp, scan.sequence));
+        if let Some(scan) = inputs.scan.and_then(|scan| self.seen_scan.take(scan)) {
             self.look(&scan);
         }
         let pose = self.estimate();

@@ -355,18 +355,9 @@ impl Default for Params {
 /// Parameters that make no sense.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of its range.
-    #[error("{name} = {value} must lie between {least} and {most}")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The smallest value allowed.
-        least: f64,
-        /// The largest value allowed.
-        most: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// Fewest above most.
     #[error(
         "min_particles = {min_particles} is above max_particles = {max_particles}; lower the one or raise the other"
@@ -425,90 +416,16 @@ pub enum ParamsError {
 impl Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let start = self.start.unwrap_or(Start {
-            x_m: 0.0,
-            y_m: 0.0,
-            heading_rad: 0.0,
-            sigma_m: 0.1,
-            sigma_rad: 0.1,
-        });
-        let motion = self.motion;
-        let recovery = self.recovery;
-        let echoes = self.echoes;
-        let ranges = [
-            ("world_resolution_m", self.world_resolution_m, 0.002, 1.0),
-            ("occupied_percent", f64::from(self.occupied_percent), 1.0, 100.0),
-            ("cone_half_width_rad", self.cone_half_width_rad, 0.0, 0.8),
-            ("cone_step_rad", self.cone_step_rad, 0.001, 0.5),
-            ("beams", f64::from(self.beams), 1.0, 4096.0),
-            ("range_max_m", self.range_max_m, 0.1, 1000.0),
-            ("sigma_m", self.sigma_m, 0.001, 2.0),
-            ("random_share", self.random_share, 0.001, 0.9),
-            ("short_share", self.short_share, 0.0, 0.9),
-            ("clip_sigmas", self.clip_sigmas, 0.5, 20.0),
-            ("echoes.late_m", echoes.late_m, 0.0, 1.0),
-            ("echoes.latest_m", echoes.latest_m, 0.0, 5.0),
-            ("echoes.lost_from_rad", echoes.lost_from_rad, 0.0, 1.57),
-            ("echoes.lost_to_rad", echoes.lost_to_rad, 0.0, 1.58),
-            ("echoes.lost_share", echoes.lost_share, 0.0, 0.95),
-            ("echoes.lost_least", echoes.lost_least, 0.0, 0.5),
-            ("echoes.detour_m", echoes.detour_m, 0.01, 100.0),
-            ("echoes.edge_rad", echoes.edge_rad, 0.0, 1.57),
-            ("independent_beams", self.independent_beams, 0.5, 4096.0),
-            ("min_particles", f64::from(self.min_particles), 10.0, 1e6),
-            ("max_particles", f64::from(self.max_particles), 10.0, 1e6),
-            ("search_beams", f64::from(self.search_beams), 1.0, 4096.0),
-            ("global_particles", f64::from(self.global_particles), 10.0, 4e6),
-            ("max_passes", f64::from(self.max_passes), 1.0, 50.0),
-            ("pass_effective_share", self.pass_effective_share, 0.01, 0.9),
-            ("resample_share", self.resample_share, 0.0, 1.0),
-            ("kld_error", self.kld_error, 0.001, 0.5),
-            ("kld_quantile", self.kld_quantile, 0.1, 5.0),
-            ("bin_m", self.bin_m, 0.005, 5.0),
-            ("bin_rad", self.bin_rad, 0.01, 3.2),
-            ("motion.place_m", motion.place_m, 0.0, 1.0),
-            ("motion.place_per_m", motion.place_per_m, 0.0, 1.0),
-            ("motion.place_m_per_rad", motion.place_m_per_rad, 0.0, 1.0),
-            ("motion.heading_rad", motion.heading_rad, 0.0, 1.0),
-            ("motion.heading_per_rad", motion.heading_per_rad, 0.0, 1.0),
-            ("motion.heading_rad_per_m", motion.heading_rad_per_m, 0.0, 1.0),
-            ("jitter_m", self.jitter_m, 0.0, 0.5),
-            ("jitter_rad", self.jitter_rad, 0.0, 0.5),
-            ("update_distance_m", self.update_distance_m, 0.0, 10.0),
-            ("update_turn_rad", self.update_turn_rad, 0.0, 3.2),
-            ("odometry_jump_m", self.odometry_jump_m, 0.1, 100.0),
-            ("start.x_m", start.x_m, -1e6, 1e6),
-            ("start.y_m", start.y_m, -1e6, 1e6),
-            ("start.heading_rad", start.heading_rad, -10.0, 10.0),
-            ("start.sigma_m", start.sigma_m, 0.0, 100.0),
-            ("start.sigma_rad", start.sigma_rad, 0.0, 4.0),
-            ("recovery.slow_rate", recovery.slow_rate, 0.0001, 0.5),
-            ("recovery.fast_rate", recovery.fast_rate, 0.001, 1.0),
-            ("recovery.tolerance", recovery.tolerance, 0.0, 0.9),
-            ("recovery.most_scattered", recovery.most_scattered, 0.0, 0.9),
-            ("recovery.early_scans", f64::from(recovery.early_scans), 0.0, 1e4),
-            ("found_sigma_m", self.found_sigma_m, 0.001, 10.0),
-            ("found_sigma_rad", self.found_sigma_rad, 0.001, 3.2),
-            ("found_share", self.found_share, 0.1, 1.0),
-            ("threads", f64::from(self.threads), 1.0, 16.0),
-            ("cloud_period_s", self.cloud_period_s, 0.0, 3600.0),
-            ("cloud_particles", f64::from(self.cloud_particles), 1.0, 1e5),
-        ];
-        for (name, value, least, most) in ranges {
-            if !(value >= least && value <= most) {
-                return Err(ParamsError::OutOfRange { name, value, least, most });
-            }
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         let Self { min_particles, max_particles, random_share, short_share, .. } = *self;
         if min_particles > max_particles {
             return Err(ParamsError::FewestAboveMost { min_particles, max_particles });
         }
-        let Recovery { slow_rate, fast_rate, .. } = recovery;
+        let Recovery { slow_rate, fast_rate, .. } = self.recovery;
         if slow_rate >= fast_rate {
             return Err(ParamsError::SlowNotSlower { slow_rate, fast_rate });
         }
-        let Echoes { lost_from_rad, lost_to_rad, .. } = echoes;
+        let Echoes { lost_from_rad, lost_to_rad, .. } = self.echoes;
         if lost_from_rad >= lost_to_rad {
             return Err(ParamsError::LossBackwards { lost_from_rad, lost_to_rad });
         }

@@ -17,7 +17,8 @@ pub use params::{Params, ParamsError};
 
 use hearing::Hearing;
 use messages::{
-    Clearance, Face, GuardReasonName, Odometry, Parameters, RangeScan, SonarAhead, Stamped, Time, Verdict,
+    Clearance, Face, GuardReasonName, Odometry, Once, Parameters, RangeScan, SonarAhead, Stamped, Time,
+    Verdict,
 };
 
 /// So many readings vote ...
@@ -47,7 +48,7 @@ pub struct Outputs {
 #[derive(Debug, Clone)]
 pub struct ProximityGuard {
     params: Params,
-    seen: Option<(Time, u64)>,
+    seen: Once,
     /// The last readings, the newest first.
     readings_m: [Option<f64>; VOTERS],
     hearing: Hearing,
@@ -64,7 +65,7 @@ impl ProximityGuard {
         params.check()?;
         Ok(Self {
             params,
-            seen: None,
+            seen: Once::default(),
             readings_m: [None; VOTERS],
             hearing: Hearing::default(),
             go: false,
@@ -90,8 +91,7 @@ impl ProximityGuard {
                 }
                 Some(distance_m) => {
                     self.hearing.hear(distance_m);
-                    if self.seen.replace((ahead.stamp, ahead.sequence)) != Some((ahead.stamp, ahead.sequence))
-                    {
+                    if self.seen.take(ahead).is_some() {
                         self.readings_m.rotate_right(1);
                         self.readings_m[0] = Some(distance_m);
                     }

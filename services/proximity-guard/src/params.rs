@@ -35,18 +35,9 @@ impl Default for Params {
 /// Why parameters of the guard are refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of what is possible.
-    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest possible value.
-        min: f64,
-        /// Largest possible value.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// A threshold within the robot.
     #[error(
         "stop_distance_m = {stop_m} is not above hull_front_m = {hull_m}, so the robot would touch before it stops; raise the first"
@@ -74,20 +65,13 @@ impl Params {
 impl messages::Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("stop_distance_m", self.stop_distance_m, 0.01, 2.0),
-            ("hull_front_m", self.hull_front_m, 0.005, 2.0),
-            ("deaf_way_m", self.deaf_way_m, 0.0, 1000.0),
-            ("max_age_ms", self.max_age_ms.into(), 10.0, 1000.0),
-            ("period_ms", self.period_ms.into(), 5.0, 100.0),
-        ];
-        match ranges.iter().find(|(_, value, min, max)| !(min..=max).contains(&value)) {
-            Some(&(name, value, min, max)) => Err(ParamsError::OutOfRange { name, value, min, max }),
-            None if self.stop_distance_m <= self.hull_front_m => {
-                Err(ParamsError::StopsTooLate { stop_m: self.stop_distance_m, hull_m: self.hull_front_m })
-            }
-            None => Ok(()),
+    fn check_together(&self) -> Result<(), ParamsError> {
+        if self.stop_distance_m <= self.hull_front_m {
+            return Err(ParamsError::StopsTooLate {
+                stop_m: self.stop_distance_m,
+                hull_m: self.hull_front_m,
+            });
         }
+        Ok(())
     }
 }

@@ -114,7 +114,11 @@ fn silence_stops() {
 #[test]
 fn refuses_nonsense_with_names_and_values() {
     let params = Params { stop_distance_m: f64::NAN, ..Params::default() };
-    assert!(params.check().is_err_and(|error| error.to_string().contains("stop_distance_m = NaN")));
+    assert!(
+        params
+            .check()
+            .is_err_and(|error| error.to_string().contains("`stop_distance_m` is not a finite number"))
+    );
 }
 
 proptest! {

@@ -1,7 +1,7 @@
 //! Errors of a localisation: poses against the truth of the same moment, and their quantiles.
 
 use geometry::{Pose2, angle};
-use messages::{PoseEstimate, Stamped, Time};
+use messages::{Once, PoseEstimate, Stamped, Time};
 use std::collections::VecDeque;
 
 /// Quantiles are exact to this.
@@ -68,7 +68,7 @@ pub(crate) struct Comparison {
     pub(crate) wrong_floor: u64,
     truths: VecDeque<(Time, Pose2, i32)>,
     waiting: VecDeque<(Time, Pose2, i32)>,
-    newest_pose: Option<(Time, u64)>,
+    newest_pose: Once,
 }
 
 impl Comparison {
@@ -82,7 +82,7 @@ impl Comparison {
             wrong_floor: 0,
             truths: VecDeque::with_capacity(REMEMBERED + 1),
             waiting: VecDeque::with_capacity(REMEMBERED + 1),
-            newest_pose: None,
+            newest_pose: Once::default(),
         }
     }
 
@@ -99,10 +99,7 @@ impl Comparison {
 
     /// A pose; each is counted once.
     pub(crate) fn pose(&mut self, estimate: Stamped<'_, PoseEstimate>) {
-        let identity = (estimate.stamp, estimate.sequence);
-        if self.newest_pose.replace(identity) == Some(identity) {
-            return;
-        }
+        let Some(estimate) = self.newest_pose.take(estimate) else { return };
         (self.accepted, self.rejected) = (estimate.accepted, estimate.rejected);
         if let Ok(pose) = estimate.pose() {
             self.waiting.push_back((estimate.stamp, pose, estimate.floor));

@@ -105,18 +105,9 @@ impl Default for Params {
 /// Why parameters of the referee are refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of what is possible.
-    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest possible value.
-        min: f64,
-        /// Largest possible value.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// A bound on the many below that on the half.
     #[error("max_p95_m = {p95_m} is below max_median_m = {median_m}; raise the first")]
     BoundsCross {
@@ -140,29 +131,10 @@ impl Params {
 impl messages::Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        within("sample_ms", self.sample_ms.into(), 10.0, 1000.0)?;
-        within("period_ms", self.period_ms.into(), 10.0, 10_000.0)?;
-        within("deliveries", self.deliveries.into(), 1.0, 1000.0)?;
-        within("max_halt_error_m", self.max_halt_error_m, 0.001, 5.0)?;
-        within("time_limit_s", self.time_limit_s, 0.0, 1e6)?;
-        within("fault_limit_s", self.fault_limit_s, 0.0, 1000.0)?;
-        within("max_median_m", self.max_median_m, 0.001, 100.0)?;
-        within("max_p95_m", self.max_p95_m, 0.001, 100.0)?;
-        within("max_target_error_m", self.max_target_error_m, 0.001, 10.0)?;
-        within("offset_m", self.offset_m, 0.0, 2.0)?;
-        within("wrong_pose_m", self.wrong_pose_m, 0.001, 10.0)?;
-        within("max_median_heading_deg", self.max_median_heading_deg, 0.01, 180.0)?;
-        within("body_length_m", self.body_length_m, 0.05, 2.0)?;
-        within("body_width_m", self.body_width_m, 0.05, 2.0)?;
-        within("body_height_m", self.body_height_m, 0.05, 3.0)?;
+    fn check_together(&self) -> Result<(), ParamsError> {
         if self.max_p95_m < self.max_median_m {
             return Err(ParamsError::BoundsCross { p95_m: self.max_p95_m, median_m: self.max_median_m });
         }
         Ok(())
     }
-}
-
-fn within(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), ParamsError> {
-    if (min..=max).contains(&value) { Ok(()) } else { Err(ParamsError::OutOfRange { name, value, min, max }) }
 }

@@ -317,8 +317,11 @@ fn refuse(params: Params, text: &str) {
 
 #[test]
 fn refuses_nonsense_with_names_and_values() {
-    refuse(Params { deliveries: 0, ..Params::default() }, "deliveries = 0");
-    refuse(Params { max_halt_error_m: f64::NAN, ..Params::default() }, "max_halt_error_m = NaN");
+    refuse(Params { deliveries: 0, ..Params::default() }, "`deliveries` is 0");
+    refuse(
+        Params { max_halt_error_m: f64::NAN, ..Params::default() },
+        "`max_halt_error_m` is not a finite number",
+    );
     refuse(Params { max_p95_m: 0.1, ..Params::default() }, "max_p95_m = 0.1 is below max_median_m = 0.25");
     refuse(Params { world: "nowhere.toml".into(), ..Params::default() }, "nowhere.toml");
     assert!(Referee::new(Params::default()).is_ok());

@@ -20,7 +20,8 @@ pub use space::{Space, View};
 use floors::Floor;
 use geometry::{Point2, Pose2, Segment, World};
 use messages::{
-    Parameters, Path, PlanRequest, PlanState, PlanStateName, PoseEstimate, Stamped, Time, TofRanges, Waypoint,
+    Once, Parameters, Path, PlanRequest, PlanState, PlanStateName, PoseEstimate, Stamped, Time, TofRanges,
+    Waypoint,
 };
 use obstacles::{GRAIN_M, Obstacles};
 use rand::SeedableRng;
@@ -70,7 +71,7 @@ pub struct SamplingPlanner {
     obstacles: Obstacles,
     /// The floor on which the obstacles are.
     obstacles_floor: Option<i32>,
-    ranges_seen: Option<Time>,
+    ranges_seen: Once,
     active: Option<Active>,
 }
 
@@ -97,7 +98,7 @@ impl SamplingPlanner {
             rng: Pcg64::seed_from_u64(seed),
             obstacles: Obstacles::default(),
             obstacles_floor: None,
-            ranges_seen: None,
+            ranges_seen: Once::default(),
             active: None,
         })
     }
@@ -149,11 +150,11 @@ impl SamplingPlanner {
         self.obstacles.fade(&rules, now);
         let news = ranges
             .and_then(|ranges| ranges.fresh(now, self.params.input_max_age()))
-            .filter(|ranges| self.ranges_seen.is_none_or(|seen| ranges.stamp > seen));
+            .filter(|ranges| self.ranges_seen.is_new(ranges));
         if let (Some(ranges), Some((number, pose))) = (news, pose)
             && let Some(floor) = self.floors.iter().find(|floor| floor.number == number)
         {
-            self.ranges_seen = Some(ranges.stamp);
+            self.ranges_seen.take(ranges);
             self.obstacles.observe(floor, &rules, now, pose, ranges.message);
         }
     }

@@ -12,7 +12,7 @@ const START: u32 = u32::MAX;
 /// Layer k holds the best length to every sample that takes k waypoints, that one included, and no fewer. The paper tries all choices
 /// of i waypoints before one of i + 1; a way with as few as possible enters each layer once, so a sample that was reached in one layer is
 /// of no use in a later one, and the layers find what the enumeration finds, in at most N²/2 looks at links instead of N!/(N - i)!
-/// (companions 1.7). Links are looked at only when they could be the best.
+/// (note 1.7). Links are looked at only when they could be the best.
 #[derive(Debug, Clone, Default)]
 pub struct Search {
     /// Length of the best way to each sample that was reached.

@@ -311,9 +311,12 @@ fn check_refused(params: Params, part: &str) {
 
 #[test]
 fn bad_parameters_are_refused() {
-    check_refused(Params { robot_radius_m: f64::NAN, ..Params::default() }, "robot_radius_m = NaN");
-    check_refused(Params { samples: 0, ..Params::default() }, "samples = 0");
+    check_refused(
+        Params { robot_radius_m: f64::NAN, ..Params::default() },
+        "`robot_radius_m` is not a finite number",
+    );
+    check_refused(Params { samples: 0, ..Params::default() }, "`samples` is 0");
     check_refused(Params { samples: 50, samples_max: 40, ..Params::default() }, "samples_max = 40");
-    check_refused(Params { tries_max: 0, ..Params::default() }, "tries_max = 0");
+    check_refused(Params { tries_max: 0, ..Params::default() }, "`tries_max` is 0");
     check_refused(Params { world: "no such file".to_owned(), ..Params::default() }, "no such file");
 }

@@ -14,7 +14,7 @@ pub use params::{Params, ParamsError};
 pub use ring::Ring;
 pub use windows::{Window, windows};
 
-use messages::{Parameters, RangeScan, SonarCommand, Stamped, Time, WallSurvey};
+use messages::{Once, Parameters, RangeScan, SonarCommand, Stamped, Time, WallSurvey};
 
 /// What the conditioner looks at.
 #[derive(Debug, Clone, Copy, Default)]
@@ -38,7 +38,7 @@ pub struct Outputs<'a> {
 #[derive(Debug, Clone)]
 pub struct ScanConditioner {
     params: Params,
-    seen: Option<(Time, u64)>,
+    seen: Once,
     kept: Vec<f32>,
 }
 
@@ -49,16 +49,13 @@ impl ScanConditioner {
     /// When the parameters make no sense.
     pub fn new(params: Params) -> Result<Self, ParamsError> {
         params.check()?;
-        Ok(Self { params, seen: None, kept: Vec::new() })
+        Ok(Self { params, seen: Once::default(), kept: Vec::new() })
     }
 
     /// Looks at a scan; one that was given before is ignored.
     pub fn step(&mut self, _now: Time, inputs: Inputs<'_>) -> Outputs<'_> {
         let none = Outputs { survey: None, scan: None };
-        let Some(raw) = inputs.raw else { return none };
-        if self.seen.replace((raw.stamp, raw.sequence)) == Some((raw.stamp, raw.sequence)) {
-            return none;
-        }
+        let Some(raw) = inputs.raw.and_then(|raw| self.seen.take(raw)) else { return none };
         let order = inputs.command.map(|command| *command.message).unwrap_or_default();
         let mut survey = WallSurvey {
             command_id: order.command_id,

@@ -46,18 +46,9 @@ impl Default for Params {
 /// Why parameters of the conditioner are refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of what is possible.
-    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest possible value.
-        min: f64,
-        /// Largest possible value.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// Neighbours without a middle.
     #[error("neighbours = {neighbours} is even and has no middle; choose an odd number")]
     NoMiddle {
@@ -69,20 +60,7 @@ pub enum ParamsError {
 impl messages::Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("neighbours", self.neighbours.into(), 1.0, 99.0),
-            ("search_deg", self.search_deg, 0.0, 60.0),
-            ("mirror_deg", self.mirror_deg, 1.0, 90.0),
-            ("alike_m", self.alike_m, 0.0, 0.2),
-            ("window_deg", self.window_deg, 1.0, 45.0),
-            ("slope_tolerance_m", self.slope_tolerance_m, 0.0, 0.5),
-        ];
-        if let Some(&(name, value, min, max)) =
-            ranges.iter().find(|(_, value, min, max)| !(min..=max).contains(&value))
-        {
-            return Err(ParamsError::OutOfRange { name, value, min, max });
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         if self.neighbours.is_multiple_of(2) {
             return Err(ParamsError::NoMiddle { neighbours: self.neighbours });
         }

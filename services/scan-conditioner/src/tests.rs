@@ -119,7 +119,7 @@ fn refuses_nonsense_with_names_and_values() {
         assert!(params.check().is_err_and(|error| error.to_string().contains(text)), "{text}");
     };
     refused(Params { neighbours: 4, ..Params::default() }, "neighbours = 4");
-    refused(Params { window_deg: f64::NAN, ..Params::default() }, "window_deg = NaN");
+    refused(Params { window_deg: f64::NAN, ..Params::default() }, "`window_deg` is not a finite number");
 }
 
 proptest! {

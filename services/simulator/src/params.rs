@@ -14,7 +14,7 @@ pub enum MotionErrors {
     None,
     /// The same for every motion, whatever its length: a way errs by `motion_error_m`, a turn by `motion_error_rad` (NXT-101, X-11).
     Absolute,
-    /// As the BotSim simulator has it (companions 1.2): in proportion, and every way begins with a turn of its own.
+    /// As the BotSim simulator has it (note 1.2): in proportion, and every way begins with a turn of its own.
     Proportional,
 }
 
@@ -122,18 +122,9 @@ impl Default for Params {
 /// Why parameters of the simulator are refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of what is possible.
-    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest possible value.
-        min: f64,
-        /// Largest possible value.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// The world file cannot be used.
     #[error("world: {0}")]
     World(#[from] WorldError),
@@ -176,29 +167,4 @@ impl Params {
 
 impl messages::Parameters for Params {
     type Error = ParamsError;
-
-    fn check(&self) -> Result<(), ParamsError> {
-        within("period_ms", self.period_ms.into(), 1.0, 50.0)?;
-        within("wheel_track_m", self.wheel_track_m, 0.05, 2.0)?;
-        within("left_gain", self.left_gain, 0.5, 1.5)?;
-        within("right_gain", self.right_gain, 0.5, 1.5)?;
-        within("wheel_acceleration_m_per_s2", self.wheel_acceleration_m_per_s2, 0.05, 20.0)?;
-        within("slip_fraction", self.slip_fraction, 0.0, 0.5)?;
-        within("way_noise_m", self.way_noise_m, 0.0, 0.1)?;
-        within("start_clearance_m", self.start_clearance_m, 0.0, 2.0)?;
-        within("motion_error_m", self.motion_error_m, 0.0, 0.1)?;
-        within("motion_error_rad", self.motion_error_rad, 0.0, 0.5)?;
-        within("way_error_fraction", self.way_error_fraction, 0.0, 0.5)?;
-        within("turn_error_fraction", self.turn_error_fraction, 0.0, 0.5)?;
-        within("watchdog_ms", self.watchdog_ms.into(), 10.0, 1000.0)?;
-        within("body_length_m", self.body_length_m, 0.05, 2.0)?;
-        within("body_width_m", self.body_width_m, 0.05, 2.0)?;
-        within("body_height_m", self.body_height_m, 0.05, 3.0)?;
-        within("walkers_wait_m", self.walkers_wait_m, 0.05, 3.0)?;
-        within("walkers_patience_s", self.walkers_patience_s, 0.0, 60.0)
-    }
-}
-
-fn within(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), ParamsError> {
-    if (min..=max).contains(&value) { Ok(()) } else { Err(ParamsError::OutOfRange { name, value, min, max }) }
 }

@@ -374,9 +374,9 @@ fn refuse(params: Params, text: &str) {
 
 #[test]
 fn refuses_nonsense_with_names_and_values() {
-    refuse(Params { period_ms: 0, ..Params::default() }, "period_ms = 0");
-    refuse(Params { right_gain: 7.0, ..Params::default() }, "right_gain = 7");
-    refuse(Params { slip_fraction: f64::NAN, ..Params::default() }, "slip_fraction = NaN");
+    refuse(Params { period_ms: 0, ..Params::default() }, "`period_ms` is 0");
+    refuse(Params { right_gain: 7.0, ..Params::default() }, "`right_gain` is 7");
+    refuse(Params { slip_fraction: f64::NAN, ..Params::default() }, "`slip_fraction` is not a finite number");
     refuse(Params { world: "nowhere.toml".into(), ..Params::default() }, "nowhere.toml");
     assert!(Simulator::new(Params::default(), 0).is_ok());
 }

@@ -77,18 +77,9 @@ impl Default for Params {
 /// Why parameters of the tag driver are refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of what is possible.
-    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest possible value.
-        min: f64,
-        /// Largest possible value.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// A dead anchor that the world does not have: surely a slip of the pen.
     #[error("dead_anchors names {id:#06x}, which the world {world:?} does not have; correct the number")]
     NoSuchAnchor {
@@ -124,20 +115,4 @@ impl Params {
 
 impl messages::Parameters for Params {
     type Error = ParamsError;
-
-    fn check(&self) -> Result<(), ParamsError> {
-        within("period_ms", self.period_ms.into(), 100.0, 10_000.0)?;
-        within("reach_m", self.reach_m, 1.0, 200.0)?;
-        within("sigma_m", self.sigma_m, 0.0, 2.0)?;
-        within("outlier_fraction", self.outlier_fraction, 0.0, 1.0)?;
-        within("outlier_m", self.outlier_m, 0.0, 20.0)?;
-        within("drop_out_fraction", self.drop_out_fraction, 0.0, 1.0)?;
-        within("antenna_x_m", self.antenna_x_m, -2.0, 2.0)?;
-        within("antenna_y_m", self.antenna_y_m, -2.0, 2.0)?;
-        within("antenna_z_m", self.antenna_z_m, 0.0, 3.0)
-    }
-}
-
-fn within(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), ParamsError> {
-    if (min..=max).contains(&value) { Ok(()) } else { Err(ParamsError::OutOfRange { name, value, min, max }) }
 }

@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use std::time::Duration;
 
-/// The module's location engine uses no more anchors at once (companions 2.3).
+/// The module's location engine uses no more anchors at once (note 2.3).
 const MOST_ANCHORS: usize = 4;
 /// Without a newer truth the tag counts as silent.
 const SILENT_AFTER: Duration = Duration::from_millis(500);

@@ -143,8 +143,8 @@ fn refuse(params: Params, text: &str) {
 
 #[test]
 fn refuses_nonsense_with_names_and_values() {
-    refuse(Params { period_ms: 50, ..Params::default() }, "period_ms = 50");
-    refuse(Params { sigma_m: f64::NAN, ..Params::default() }, "sigma_m = NaN");
+    refuse(Params { period_ms: 50, ..Params::default() }, "`period_ms` is 50");
+    refuse(Params { sigma_m: f64::NAN, ..Params::default() }, "`sigma_m` is not a finite number");
     refuse(Params { dead_anchors: vec![9], ..Params::default() }, "dead_anchors names 0x0009");
     refuse(Params { world: "nowhere.toml".into(), ..Params::default() }, "nowhere.toml");
     assert!(TagDriver::new(Params::default(), 0).is_ok());

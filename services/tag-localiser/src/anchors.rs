@@ -4,7 +4,7 @@ use messages::AnchorRange;
 
 /// How many anchors are remembered: the bits of `PoseEstimate::alive_anchors`.
 pub(crate) const ANCHOR_LIMIT: usize = 32;
-/// How many anchors a DWM1001 uses at once (companions 2.3): with so many heard, another's silence means nothing.
+/// How many anchors a DWM1001 uses at once (note 2.3): with so many heard, another's silence means nothing.
 const USED_AT_ONCE: usize = 4;
 /// Share of wrong readings, averaged over about ten, from which an anchor counts as always wrong, and below which as right again.
 const WRONG: f64 = 0.75;

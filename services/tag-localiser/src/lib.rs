@@ -24,8 +24,8 @@ use bank::{Bank, Estimate, HEADINGS};
 use geometry::Pose2;
 use hypothesis::{Hypothesis, MotionNoise, RangeReading};
 use messages::{
-    ANCHOR_CAPACITY, HeadingCorrection, LocationStateName, Message, Odometry, Parameters, PoseEstimate,
-    Stamped, TagRanges, Time, TofRanges,
+    ANCHOR_CAPACITY, HeadingCorrection, LocationStateName, Odometry, Once, Parameters, PoseEstimate, Stamped,
+    TagRanges, Time, TofRanges,
 };
 use places::{PLACE_LIMIT, Places};
 use serde::{Deserialize, Serialize};
@@ -101,14 +101,9 @@ pub struct Snapshot {
 /// The stamps, and publisher's counts, of the messages used last.
 #[derive(Debug, Clone, Copy, Default)]
 struct Seen {
-    tag: Option<(Time, u64)>,
+    tag: Once,
     ranges: Option<Time>,
-    heading: Option<(Time, u64)>,
-}
-
-fn is_new<T: Message>(last: &mut Option<(Time, u64)>, message: &Stamped<'_, T>) -> bool {
-    let this = Some((message.stamp, message.sequence));
-    std::mem::replace(last, this) != this
+    heading: Once,
 }
 
 impl TagLocaliser {
@@ -174,12 +169,12 @@ impl TagLocaliser {
             self.advance(&odometry);
         }
         if let Some(tag) = inputs.tag
-            && is_new(&mut self.seen.tag, &tag)
+            && self.seen.tag.take(tag).is_some()
         {
             self.hear(&tag);
         }
         if let Some(heading) = inputs.heading
-            && is_new(&mut self.seen.heading, &heading)
+            && self.seen.heading.take(heading).is_some()
         {
             self.turn_to_wall(&heading);
         }
@@ -368,7 +363,7 @@ impl TagLocaliser {
         let best = self.bank.estimate();
         let place = best.map(|one| [one.pose.x_m, one.pose.y_m]);
         let silent =
-            self.seen.tag.is_none_or(|(stamp, _)| now.seconds_since(stamp) > self.params.tag_timeout_s);
+            self.seen.tag.last().is_none_or(|last| now.seconds_since(last.stamp) > self.params.tag_timeout_s);
         let mut bits = self.anchors.bits(floor, place, self.params.silent_messages);
         if silent {
             bits = AnchorBits { alive: 0, dead: bits.alive | bits.dead };

@@ -74,10 +74,13 @@ pub struct Params {
 #[serde(deny_unknown_fields)]
 pub struct Start {
     /// Place in the map.
+    #[schemars(range(min = -1000000.0, max = 1000000.0))]
     pub x_m: f64,
     /// Place in the map.
+    #[schemars(range(min = -1000000.0, max = 1000000.0))]
     pub y_m: f64,
     /// Heading in the map.
+    #[schemars(range(min = -10.0, max = 10.0))]
     pub heading_rad: f64,
     /// Standard deviation of the place.
     #[serde(default = "start_sigma_m")]
@@ -130,18 +133,9 @@ impl Default for Params {
 /// Parameters that make no sense.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of its range.
-    #[error("{name} = {value} must lie between {least} and {most}")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The smallest value allowed.
-        least: f64,
-        /// The largest value allowed.
-        most: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// A wrong spell that could not be told from a right one.
     #[error(
         "outlier_chance = {outlier_chance} and recovery_chance = {recovery_chance} add up to more than 0.9: an anchor would change between right and wrong at random; lower one of them"
@@ -157,45 +151,7 @@ pub enum ParamsError {
 impl Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let start = self.start.unwrap_or(Start {
-            x_m: 0.0,
-            y_m: 0.0,
-            heading_rad: 0.0,
-            sigma_m: 1.0,
-            sigma_rad: 0.1,
-            floor: 0,
-        });
-        let ranges = [
-            ("range_sigma_m", self.range_sigma_m, 0.01, 2.0),
-            ("longest_range_m", self.longest_range_m, 1.0, 1000.0),
-            ("min_quality_percent", self.min_quality_percent, 0.0, 100.0),
-            ("position_sigma_m", self.position_sigma_m, 0.01, 5.0),
-            ("outlier_chance", self.outlier_chance, 0.0001, 0.5),
-            ("recovery_chance", self.recovery_chance, 0.0001, 0.9),
-            ("distance_sigma_m", self.distance_sigma_m, 0.0, 1.0),
-            ("drift_sigma_rad", self.drift_sigma_rad, 0.0, 1.0),
-            ("turn_sigma_rad", self.turn_sigma_rad, 0.0, 1.0),
-            ("odometry_jump_m", self.odometry_jump_m, 0.1, 100.0),
-            ("floor_sigma_m", self.floor_sigma_m, 0.0, 1.0),
-            ("side_sigma_m", self.side_sigma_m, 0.005, 0.5),
-            ("side_period_s", self.side_period_s, 0.0, 10.0),
-            ("tag_timeout_s", self.tag_timeout_s, 0.1, 600.0),
-            ("silent_messages", f64::from(self.silent_messages), 2.0, 10000.0),
-            ("floor_messages", f64::from(self.floor_messages), 1.0, 1000.0),
-            ("recovery_messages", f64::from(self.recovery_messages), 1.0, 1000.0),
-            ("lost_sigma_m", self.lost_sigma_m, 0.2, 100.0),
-            ("start.x_m", start.x_m, -1e6, 1e6),
-            ("start.y_m", start.y_m, -1e6, 1e6),
-            ("start.heading_rad", start.heading_rad, -10.0, 10.0),
-            ("start.sigma_m", start.sigma_m, 0.001, 100.0),
-            ("start.sigma_rad", start.sigma_rad, 0.001, 1.0),
-        ];
-        for (name, value, least, most) in ranges {
-            if !(value >= least && value <= most) {
-                return Err(ParamsError::OutOfRange { name, value, least, most });
-            }
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         if self.outlier_chance + self.recovery_chance > 0.9 {
             return Err(ParamsError::RestlessAnchors {
                 outlier_chance: self.outlier_chance,

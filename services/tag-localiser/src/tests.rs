@@ -55,9 +55,9 @@ fn check_refused(change: impl Fn(&mut Params), named: &str) {
 
 #[test]
 fn nonsense_parameters_are_refused() {
-    check_refused(|params| params.range_sigma_m = 0.0, "range_sigma_m = 0 ");
-    check_refused(|params| params.range_sigma_m = f64::NAN, "range_sigma_m = NaN");
-    check_refused(|params| params.silent_messages = 0, "silent_messages = 0");
+    check_refused(|params| params.range_sigma_m = 0.0, "`range_sigma_m` is 0");
+    check_refused(|params| params.range_sigma_m = f64::NAN, "`range_sigma_m` is not a finite number");
+    check_refused(|params| params.silent_messages = 0, "`silent_messages` is 0");
     check_refused(|params| params.lost_sigma_m = -1.0, "lost_sigma_m");
     check_refused(
         |params| (params.outlier_chance, params.recovery_chance) = (0.4, 0.8),

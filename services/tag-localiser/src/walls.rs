@@ -11,7 +11,7 @@ pub(crate) const SIDE_SENSORS: [usize; 4] = [0, 1, 6, 7];
 const FARTHEST_M: f64 = 1.0;
 /// A wall met at a flatter angle gives no distance: the cosine of 30 degrees.
 const SQUAREST: f64 = 0.866;
-/// How near to a door's opening the wall is not trusted: half the sensor's cone at a metre (companions 2.1).
+/// How near to a door's opening the wall is not trusted: half the sensor's cone at a metre (note 2.1).
 const DOOR_MARGIN_M: f64 = 0.25;
 /// Share of readings of a wall that something else causes: people, furniture, notice boards.
 const OBSTRUCTED: f64 = 0.3;

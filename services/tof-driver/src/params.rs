@@ -16,7 +16,7 @@ pub enum Device {
     Simulated,
 }
 
-/// The distance modes of a VL53L1X (companions 2.1).
+/// The distance modes of a VL53L1X (note 2.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DistanceMode {
@@ -110,18 +110,9 @@ impl Default for Params {
 /// Why parameters of the time-of-flight driver are refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of what is possible.
-    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest possible value.
-        min: f64,
-        /// Largest possible value.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// The mode needs more light.
     #[error(
         "timing_budget_ms = {budget_ms} is below the {needed_ms} ms that mode {mode:?} needs; lengthen it"
@@ -204,15 +195,7 @@ impl Params {
 impl messages::Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        within("period_ms", self.period_ms.into(), 24.0, 1000.0)?;
-        within("timing_budget_ms", self.timing_budget_ms.into(), 20.0, 996.0)?;
-        within("noise_above_m", self.noise_above_m, 0.2, 4.0)?;
-        within("no_target_fraction", self.no_target_fraction, 0.0, 1.0)?;
-        within("height_m", self.height_m, 0.01, 2.0)?;
-        within("field_of_view_deg", self.field_of_view_deg, 15.0, 27.0)?;
-        within("rays_per_side", self.rays_per_side.into(), 1.0, 16.0)?;
-        within("sure_fill_fraction", self.sure_fill_fraction, 0.01, 1.0)?;
+    fn check_together(&self) -> Result<(), ParamsError> {
         let (period_ms, budget_ms, mode) = (self.period_ms, self.timing_budget_ms, self.mode);
         let needed_ms = mode.shortest_budget_ms();
         if budget_ms < needed_ms {
@@ -226,8 +209,4 @@ impl messages::Parameters for Params {
             None => Ok(()),
         }
     }
-}
-
-fn within(name: &'static str, value: f64, min: f64, max: f64) -> Result<(), ParamsError> {
-    if (min..=max).contains(&value) { Ok(()) } else { Err(ParamsError::OutOfRange { name, value, min, max }) }
 }

@@ -197,8 +197,8 @@ fn refuse(params: Params, text: &str) {
 fn refuses_nonsense_with_names_and_values() {
     refuse(Params { timing_budget_ms: 20, ..Params::default() }, "timing_budget_ms = 20 is below the 33 ms");
     refuse(Params { period_ms: 36, ..Params::default() }, "period_ms = 36 has no room");
-    refuse(Params { field_of_view_deg: 90.0, ..Params::default() }, "field_of_view_deg = 90");
-    refuse(Params { noise_above_m: f64::NAN, ..Params::default() }, "noise_above_m = NaN");
+    refuse(Params { field_of_view_deg: 90.0, ..Params::default() }, "`field_of_view_deg` is 90");
+    refuse(Params { noise_above_m: f64::NAN, ..Params::default() }, "`noise_above_m` is not a finite number");
     refuse(Params { broken_sensors: vec![8], ..Params::default() }, "names 8");
     refuse(Params { world: "nowhere.toml".into(), ..Params::default() }, "nowhere.toml");
     assert!(

@@ -23,7 +23,7 @@ pub enum NoiseProfile {
     /// and a largest range (NXT-032 to NXT-034, NXT-037, NXT-101).
     #[default]
     Paper,
-    /// As the BotSim simulator has it (companions 1.2): a single ray whose end scatters in x and in y, and no largest range.
+    /// As the BotSim simulator has it (note 1.2): a single ray whose end scatters in x and in y, and no largest range.
     Botsim,
     /// A cone without any error: for comparisons.
     None,
@@ -50,7 +50,7 @@ pub struct Params {
     /// So many times faster the servo turns back.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub return_speedup: f64,
-    /// Nothing nearer can be measured (companions 1.3, unconfirmed).
+    /// Nothing nearer can be measured (note 1.3, unconfirmed).
     #[schemars(range(min = 0.0, max = 0.2))]
     pub range_min_m: f64,
     /// The largest reading, which says that there was no echo: 255 cm.
@@ -123,18 +123,9 @@ impl Default for Params {
 /// Why parameters of the ultrasonic driver are refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of what is possible.
-    #[error("{name} = {value} is not within {min} to {max}; choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Smallest possible value.
-        min: f64,
-        /// Largest possible value.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// Two bounds the wrong way around.
     #[error("{low_name} = {low} is not below {high_name} = {high}; lower the first")]
     BoundsCross {
@@ -175,31 +166,7 @@ impl Params {
 impl messages::Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("period_ms", self.period_ms.into(), 5.0, 200.0),
-            ("readings", self.readings.into(), 8.0, 3600.0),
-            ("reading_ms", self.reading_ms.into(), 1.0, 200.0),
-            ("return_speedup", self.return_speedup, 0.1, 100.0),
-            ("range_min_m", self.range_min_m, 0.0, 0.2),
-            ("range_max_m", self.range_max_m, 0.3, 20.0),
-            ("half_cone_deg", self.half_cone_deg, 0.0, 45.0),
-            ("ray_step_deg", self.ray_step_deg, 0.1, 10.0),
-            ("sigma_m", self.sigma_m, 0.0, 0.2),
-            ("resolution_m", self.resolution_m, 0.0, 0.1),
-            ("incidence_growth", self.incidence_growth, 0.0, 100.0),
-            ("latest_m", self.latest_m, 0.0, 2.0),
-            ("edge_deg", self.edge_deg, 0.0, 90.0),
-            ("lost_from_deg", self.lost_from_deg, 0.0, 89.0),
-            ("lost_to_deg", self.lost_to_deg, 1.0, 90.0),
-            ("lost_share", self.lost_share, 0.0, 1.0),
-            ("late_share", self.late_share, 0.0, 1.0),
-        ];
-        if let Some(&(name, value, min, max)) =
-            ranges.iter().find(|(_, value, min, max)| !(min..=max).contains(&value))
-        {
-            return Err(ParamsError::OutOfRange { name, value, min, max });
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         let (low, high) = (self.lost_from_deg, self.lost_to_deg);
         if low >= high {
             let (low_name, high_name) = ("lost_from_deg", "lost_to_deg");

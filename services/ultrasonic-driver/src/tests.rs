@@ -200,9 +200,9 @@ fn refuses_nonsense_with_names_and_values() {
     let refused = |params: Params, text: &str| {
         assert!(params.check().is_err_and(|error| error.to_string().contains(text)), "{text}");
     };
-    refused(Params { sigma_m: f64::NAN, ..Params::default() }, "sigma_m = NaN");
+    refused(Params { sigma_m: f64::NAN, ..Params::default() }, "`sigma_m` is not a finite number");
     refused(Params { lost_from_deg: 70.0, ..Params::default() }, "lost_from_deg = 70");
-    refused(Params { readings: 0, ..Params::default() }, "readings = 0");
+    refused(Params { readings: 0, ..Params::default() }, "`readings` is 0");
 }
 
 proptest! {

@@ -23,10 +23,10 @@ pub struct Params {
     /// The fastest turn.
     #[schemars(range(min = 0.05, max = 10.0))]
     pub top_turn_rad_per_s: f64,
-    /// Speeds from which this deceleration does not stop before the obstacle are not admissible (companions 2.5).
+    /// Speeds from which this deceleration does not stop before the obstacle are not admissible (note 2.5).
     #[schemars(range(min = 0.01, max = 20.0))]
     pub brake_mps2: f64,
-    /// Time from a command to the wheels (companions 2.5).
+    /// Time from a command to the wheels (note 2.5).
     #[schemars(range(min = 0.0, max = 2.0))]
     pub latency_s: f64,
     /// Time between two steps.
@@ -132,18 +132,9 @@ impl Default for Params {
 /// Parameters that make no sense.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ParamsError {
-    /// A number outside of its range.
-    #[error("{name} = {value} is not within {min} to {max}: choose a value in that range")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The least.
-        min: f64,
-        /// The most.
-        max: f64,
-    },
+    /// A value that does not fit its field.
+    #[error(transparent)]
+    Misfit(#[from] messages::Misfit),
     /// A turn that would end before it begins.
     #[error("rotation_end_rad = {end_rad} is not below rotation_always_rad = {begin_rad}: lower the first")]
     RotationEndsEarly {
@@ -160,41 +151,7 @@ pub enum ParamsError {
 impl messages::Parameters for Params {
     type Error = ParamsError;
 
-    fn check(&self) -> Result<(), ParamsError> {
-        let ranges = [
-            ("track_m", self.track_m, 0.05, 5.0),
-            ("top_speed_mps", self.top_speed_mps, 0.01, 5.0),
-            ("acceleration_mps2", self.acceleration_mps2, 0.01, 20.0),
-            ("turn_acceleration_rad_per_s2", self.turn_acceleration_rad_per_s2, 0.05, 50.0),
-            ("top_turn_rad_per_s", self.top_turn_rad_per_s, 0.05, 10.0),
-            ("brake_mps2", self.brake_mps2, 0.01, 20.0),
-            ("latency_s", self.latency_s, 0.0, 2.0),
-            ("period_ms", self.period_ms as f64, 1.0, 1000.0),
-            ("input_max_age_ms", self.input_max_age_ms as f64, 1.0, 1e4),
-            ("command_max_age_ms", self.command_max_age_ms as f64, 1.0, 3.6e6),
-            ("reach_tolerance_m", self.reach_tolerance_m, 0.005, 2.0),
-            ("lookahead_m", self.lookahead_m, 0.05, 5.0),
-            ("horizon_s", self.horizon_s, 0.1, 5.0),
-            ("rotation_always_rad", self.rotation_always_rad, 0.1, std::f64::consts::PI),
-            ("rotation_end_rad", self.rotation_end_rad, 0.01, 3.0),
-            ("rotation_least_mps", self.rotation_least_mps, 0.0, 1.0),
-            ("turn_tolerance_rad", self.turn_tolerance_rad, 0.002, 1.0),
-            ("creep_speed_mps", self.creep_speed_mps, 0.005, 1.0),
-            ("heading_weight", self.heading_weight, 0.0, 10.0),
-            ("clearance_weight", self.clearance_weight, 0.0, 10.0),
-            ("velocity_weight", self.velocity_weight, 0.0, 10.0),
-            ("front_trigger_m", self.front_trigger_m, 0.01, 10.0),
-            ("side_trigger_m", self.side_trigger_m, 0.0, 2.0),
-            ("brake_distance_m", self.brake_distance_m, 0.0, 10.0),
-            ("memory_ms", self.memory_ms as f64, 0.0, 6e4),
-            ("hull_front_m", self.hull_front_m, 0.01, 5.0),
-            ("hull_rear_m", self.hull_rear_m, 0.01, 5.0),
-            ("hull_side_m", self.hull_side_m, 0.01, 5.0),
-        ];
-        let outside = ranges.iter().find(|(_, value, min, max)| !(min..=max).contains(&value));
-        if let Some(&(name, value, min, max)) = outside {
-            return Err(ParamsError::OutOfRange { name, value, min, max });
-        }
+    fn check_together(&self) -> Result<(), ParamsError> {
         if self.rotation_end_rad >= self.rotation_always_rad {
             let (end_rad, begin_rad) = (self.rotation_end_rad, self.rotation_always_rad);
             return Err(ParamsError::RotationEndsEarly { end_rad, begin_rad });

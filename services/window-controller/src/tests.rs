@@ -289,8 +289,14 @@ fn check_refused(params: Params, expected: &str) {
 
 #[test]
 fn wrong_parameters_are_refused() {
-    check_refused(Params { track_m: 0.0, ..Params::default() }, "track_m = 0 is not within 0.05 to 5");
-    check_refused(Params { top_speed_mps: f64::NAN, ..Params::default() }, "top_speed_mps = NaN");
+    check_refused(
+        Params { track_m: 0.0, ..Params::default() },
+        "`track_m` is 0.0 m, which is out of range: it must be from 0.05 to 5 m",
+    );
+    check_refused(
+        Params { top_speed_mps: f64::NAN, ..Params::default() },
+        "`top_speed_mps` is not a finite number",
+    );
     check_refused(
         Params { rotation_end_rad: 1.2, ..Params::default() },
         "rotation_end_rad = 1.2 is not below",

@@ -3,7 +3,7 @@
 use crate::worker::{MEMORY_MAX, PASSED_MAX, USED_MAX_S, binaries};
 use board::clock;
 use clap::ValueEnum;
-use fuzzy_controller::fuzzy::{Engine, Options, fcl};
+use fuzzy::{Engine, Options, fcl};
 use geometry::{OccupancyGrid, World};
 use grid_planner::GridPlanner;
 use log_player::LogPlayer;

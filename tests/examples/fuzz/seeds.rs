@@ -411,6 +411,8 @@ fn recordings(scratch: &Path) -> Vec<Vec<u8>> {
         name: message.name.to_lowercase(),
         publisher: Some("somebody".into()),
         depth: 8,
+        readers: vec![],
+        elements: messages::ELEMENTS,
         message,
     };
     let small = Description {

@@ -93,13 +93,16 @@ fn refuse(params: Params, text: &str) {
 #[test]
 fn refuses_nonsense_with_names_and_values() {
     let default = Params::default;
-    refuse(Params { period_ms: 0, ..default() }, "period_ms = 0");
-    refuse(Params { guard_deadline_ms: 5, ..default() }, "guard_deadline_ms = 5");
+    refuse(Params { period_ms: 0, ..default() }, "`period_ms` is 0");
+    refuse(Params { guard_deadline_ms: 5, ..default() }, "`guard_deadline_ms` is 5");
     refuse(Params { command_deadline_ms: 19, ..default() }, "command_deadline_ms = 19");
-    refuse(Params { max_wheel_speed_mps: f64::NAN, ..default() }, "max_wheel_speed_mps = NaN");
-    refuse(Params { wheel_track_m: 0.0, ..default() }, "wheel_track_m = 0");
-    refuse(Params { hull_side_m: f64::NAN, ..default() }, "hull_side_m = NaN");
-    refuse(Params { reverse_speed_mps: 0.5, ..default() }, "reverse_speed_mps = 0.5");
+    refuse(
+        Params { max_wheel_speed_mps: f64::NAN, ..default() },
+        "`max_wheel_speed_mps` is not a finite number",
+    );
+    refuse(Params { wheel_track_m: 0.0, ..default() }, "`wheel_track_m` is 0");
+    refuse(Params { hull_side_m: f64::NAN, ..default() }, "`hull_side_m` is not a finite number");
+    refuse(Params { reverse_speed_mps: 0.5, ..default() }, "`reverse_speed_mps` is 0.5");
     refuse(Params { max_speed_up_m_per_s2: 1.0, ..default() }, "is above deceleration_m_per_s2 = 0.8");
     refuse(
         Params { motor_watchdog_ms: 20, ..default() },

@@ -36,7 +36,9 @@ fn worlds_without_a_target_are_refused() {
     let far = Params { random_target: true, target_clearance_m: 0.6, ..Params::default() };
     assert!(Executive::in_world(far, &world, 1).is_err());
     let params = Params { way_sigmas: f64::NAN, ..Params::default() };
-    assert!(params.check().is_err_and(|error| error.to_string().contains("way_sigmas = NaN")));
+    assert!(
+        params.check().is_err_and(|error| error.to_string().contains("`way_sigmas` is not a finite number"))
+    );
 }
 
 /// The other services, as they answer at once: the robot is where it is told to be.

@@ -270,8 +270,8 @@ fn check_params(change: impl Fn(&mut Params), expected: &str) {
 
 #[test]
 fn bad_parameters_are_refused() {
-    check_params(|params| params.robot_radius_m = f64::NAN, "robot_radius_m = NaN is not within 0 to 2");
-    check_params(|params| params.resolution_m = 0.0, "resolution_m = 0");
+    check_params(|params| params.robot_radius_m = f64::NAN, "`robot_radius_m` is not a finite number");
+    check_params(|params| params.resolution_m = 0.0, "`resolution_m` is 0");
     check_params(|params| params.world = "nowhere.toml".into(), "nowhere.toml");
     check_params(|params| (params.world, params.map) = ("a".into(), "b".into()), "leave one of them empty");
     assert!(GridPlanner::new(Params::default()).is_ok());

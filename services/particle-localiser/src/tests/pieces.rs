@@ -187,7 +187,7 @@ fn wrong_parameters_are_refused() {
     ));
     assert!(matches!(
         check(Params { sigma_m: f64::NAN, ..Params::default() }),
-        ParamsError::OutOfRange { name: "sigma_m", .. }
+        ParamsError::Misfit(misfit) if misfit.name() == "sigma_m"
     ));
     let recovery = Recovery { slow_rate: 0.4, ..Recovery::default() };
     assert!(matches!(check(Params { recovery, ..Params::default() }), ParamsError::SlowNotSlower { .. }));

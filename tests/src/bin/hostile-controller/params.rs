@@ -121,7 +121,7 @@ impl Params {
 impl messages::Parameters for Params {
     type Error = fuzzy_controller::ParamsError;
 
-    fn check(&self) -> Result<(), Self::Error> {
-        self.fuzzy.check()
+    fn check_together(&self) -> Result<(), Self::Error> {
+        self.fuzzy.check_together()
     }
 }

@@ -1,8 +1,8 @@
 //! From a system back to a text that reads as the same system.
 
-use super::super::norms::{Hedge, SNorm, TNorm, keyword_of};
-use super::super::system::{Condition, Fallback, Input, Method, NamedTerm, Output, Rule, RuleBlock, System};
-use super::super::terms::Term;
+use crate::norms::{Hedge, SNorm, TNorm, keyword_of};
+use crate::system::{Condition, Fallback, Input, Method, NamedTerm, Output, Rule, RuleBlock, System};
+use crate::terms::Term;
 use std::fmt::{Result, Write};
 
 /// The system as an FCL function block.

@@ -1,6 +1,6 @@
 //! Reads FLL, the language of fuzzylite, as far as the reference files use it, by rewriting it as FCL.
 
-use fuzzy_controller::fuzzy::{Integration, Options, System, fcl};
+use fuzzy::{Integration, Options, System, fcl};
 
 /// fuzzylite compares numbers with this tolerance.
 pub(crate) const FUZZYLITE_TOLERANCE: f64 = 1e-6;

@@ -7,6 +7,7 @@ mod engine;
 pub mod fcl;
 mod levels;
 mod norms;
+mod options;
 mod outputs;
 mod premises;
 mod quadrature;
@@ -17,8 +18,9 @@ mod terms;
 mod tests;
 mod walk;
 
-pub use engine::{Engine, EngineError, Integration, Options};
+pub use engine::Engine;
 pub use norms::{Hedge, SNorm, TNorm};
+pub use options::{EngineError, Integration, Options};
 pub use system::{
     Conclusion, Condition, Fallback, Input, Method, NamedTerm, Output, Rule, RuleBlock, System,
 };

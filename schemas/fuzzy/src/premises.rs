@@ -1,8 +1,8 @@
 //! From input values to the activation of every rule, compiled: memberships lie in one flat array of slots, terms with
 //! straight flanks are computed side by side without a branch, and a rule that is a plain conjunction is a row of slots.
 
-use super::engine::EngineError;
 use super::norms::{Hedge, SNorm, TNorm, larger, smaller};
+use super::options::EngineError;
 use super::system::{Condition, RuleBlock, System};
 use super::terms::Term;
 use std::ops::Range;

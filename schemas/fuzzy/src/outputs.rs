@@ -1,8 +1,8 @@
 //! One output of a compiled system: which rules speak for which term, and how their degrees become a number.
 
-use super::engine::{EngineError, Integration, Operators};
 use super::levels::Levels;
 use super::norms::{SNorm, TNorm, keyword_of, larger};
+use super::options::{EngineError, Integration, Operators};
 use super::quadrature::Quadrature;
 use super::sampled::Sampled;
 use super::system::{Fallback, Method, Output, System};

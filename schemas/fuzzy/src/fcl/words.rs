@@ -1,6 +1,6 @@
 //! The names of shapes: one table for reader and writer.
 
-use super::super::terms::Term;
+use crate::terms::Term;
 
 impl Term {
     /// The term of a named shape, in either case: the names of fuzzylite (`Triangle`, `GaussianProduct`,

@@ -1,10 +1,10 @@
 //! From tokens to a system: the declarations. Rules are in `rules`.
 
-use super::super::norms::{SNorm, TNorm, by_keyword};
-use super::super::system::{Fallback, Input, Method, NamedTerm, Output, RuleBlock, System};
-use super::super::terms::Term;
 use super::lexer::{Placed, Token, tokens};
 use super::{FclError, FclErrorKind};
+use crate::norms::{SNorm, TNorm, by_keyword};
+use crate::system::{Fallback, Input, Method, NamedTerm, Output, RuleBlock, System};
+use crate::terms::Term;
 
 /// Reads one function block.
 pub fn read(text: &str) -> Result<System, FclError> {

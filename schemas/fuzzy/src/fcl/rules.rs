@@ -1,11 +1,11 @@
 //! Rules: `RULE 3 : IF a IS x AND NOT (b IS very y OR c IS NOT z) THEN u IS v, w IS t WITH 0.5;`
 //! NOT binds closer than AND, AND closer than OR; equals are read from the left.
 
-use super::super::norms::{Hedge, by_keyword};
-use super::super::system::{Conclusion, Condition, Input, Rule, System};
 use super::lexer::Token;
 use super::parser::Parser;
 use super::{FclError, FclErrorKind};
+use crate::norms::{Hedge, by_keyword};
+use crate::system::{Conclusion, Condition, Input, Rule, System};
 
 /// The parts of one condition, and the depth of its brackets.
 const MOST_PARTS: usize = 256;

@@ -1,6 +1,6 @@
 //! A step allocates nothing, whatever the kernel.
 
-use fuzzy_controller::fuzzy::{Engine, Options, fcl};
+use fuzzy::{Engine, Options, fcl};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 

@@ -10,7 +10,7 @@
 
 mod fll;
 
-use fuzzy_controller::fuzzy::{Engine, Integration, Options, System, fcl};
+use fuzzy::{Engine, Integration, Options, System, fcl};
 use std::path::PathBuf;
 
 /// A file beside the project, or `None` with a line that says so.

@@ -2,7 +2,7 @@
 //! 8.4 us at 100 samples. Run with `cargo bench -p fuzzy-controller`.
 
 use divan::Bencher;
-use fuzzy_controller::fuzzy::{Engine, Integration, Options, fcl};
+use fuzzy::{Engine, Integration, Options, fcl};
 use std::fmt::Write;
 
 fn main() {
