@@ -284,16 +284,13 @@ fn tags(text: &str) -> BTreeSet<String> {
             let Some(rest) = text[start + kind.len()..].strip_prefix(separator).filter(|_| !is_word) else {
                 continue;
             };
-            let number: String =
-                rest.chars().take_while(|letter| letter.is_ascii_digit() || *letter == '.').collect();
-            let number = number.trim_end_matches('.');
-            if number.starts_with(|first: char| first.is_ascii_digit())
-                && (separator == '-' || number.contains('.'))
-            {
-                tags.insert(format!(
-                    "{kind}{separator}{}",
-                    number.split('.').take(2).collect::<Vec<_>>().join(".")
-                ));
+            let digits = |text: &str| text.chars().take_while(char::is_ascii_digit).collect::<String>();
+            let (number, is_note) = (digits(rest), separator == ' ');
+            let part = rest[number.len()..].strip_prefix('.').map(digits).unwrap_or_default();
+            if is_note && !number.is_empty() && !part.is_empty() {
+                tags.insert(format!("{kind} {number}.{part}"));
+            } else if !is_note && number.len() > 1 {
+                tags.insert(format!("{kind}-{number}"));
             }
         }
     }
@@ -321,6 +318,6 @@ fn every_tag_is_defined_and_cited() {
 
 #[test]
 fn tags_are_found() {
-    let found = tags("(COF-047, X-26); see note 2.6. XX-1 and COF-, note that 3 are none");
+    let found = tags("(COF-047..049, X-26); see note 2.6. XX-12, X-1 and COF-, note that 3 are none");
     assert_eq!(found.into_iter().collect::<Vec<_>>(), ["COF-047", "X-26", "note 2.6"]);
 }

@@ -34,6 +34,8 @@ pub struct Sighting {
     pub seen: Time,
     /// How many readings have to pass through it until it is gone.
     pub weight: u8,
+    /// Whether it would have been forgotten, had it not been held.
+    pub is_old: bool,
 }
 
 /// A sighting as it is kept for a successor: its place in millimetres, its weight, and when it was seen.
@@ -94,14 +96,14 @@ impl Sightings {
     pub fn add(&mut self, now: Time, place: Point2<f64>) {
         let known = self.points.iter_mut().find(|point| (point.place - place).norm() < ONE_POINT_M);
         if let Some(point) = known {
-            point.seen = now;
+            (point.seen, point.is_old) = (now, false);
             point.weight = (point.weight + SIGHTING).min(WEIGHT_MAX);
         } else if place.x.is_finite() && place.y.is_finite() {
             if self.points.len() >= SIGHTINGS_MAX {
                 let oldest = (0..self.points.len()).min_by_key(|&index| self.points[index].seen);
                 oldest.map(|index| self.points.swap_remove(index));
             }
-            self.points.push(Sighting { place, seen: now, weight: SIGHTING });
+            self.points.push(Sighting { place, seen: now, weight: SIGHTING, is_old: false });
         }
     }
 
@@ -114,13 +116,17 @@ impl Sightings {
 
     /// Lets everything be as old as it was so long ago.
     pub fn hold(&mut self, time: std::time::Duration) {
-        self.hold_where(time, |_| true);
+        for point in &mut self.points {
+            point.seen = point.seen.after(time);
+        }
     }
 
-    /// The same for what lies at such places.
-    pub fn hold_where(&mut self, time: std::time::Duration, is_held: impl Fn(Point2<f64>) -> bool) {
-        for point in self.points.iter_mut().filter(|point| is_held(point.place)) {
-            point.seen = point.seen.after(time);
+    /// Keeps what lies at such places, when it would be forgotten for its age, and marks it as old.
+    pub fn keep_old(&mut self, now: Time, is_kept: impl Fn(Point2<f64>) -> bool) {
+        for point in self.points.iter_mut().filter(|point| now.seconds_since(point.seen) > KEPT_S) {
+            if is_kept(point.place) {
+                (point.seen, point.is_old) = (now, true);
+            }
         }
     }
 
@@ -138,6 +144,7 @@ impl Sightings {
             place: Point2::new(f64::from(x_mm) / 1e3, f64::from(y_mm) / 1e3),
             weight,
             seen: Time::from_nanos(seen),
+            is_old: false,
         };
         Self { points: kept.iter().take(SIGHTINGS_MAX).map(point).collect() }
     }

@@ -19,8 +19,10 @@ const TOLD_APART_M: f32 = 0.02;
 const STANDS_WITHIN_M: f64 = 0.03;
 const STANDS_WITHIN_RAD: f64 = 0.05;
 const STANDS_AFTER_S: f64 = 1.0;
-/// What lies so near to the hull can be touched by a turn before a sensor sees it.
+/// What lies so near to the hull can be touched by a turn before a sensor sees it. When it is old it counts as so much farther to the front
+/// and to the side: a reading says to a few centimetres only where in its cone a thing is, and the robot may pass what it may not turn into.
 const HELD_WITHIN_M: f64 = 0.15;
+const OLD_FARTHER_M: f64 = 0.025;
 /// In another frame, or after an unseen journey, places mean nothing.
 const JUMP_M: f64 = 0.5;
 
@@ -92,8 +94,8 @@ pub(crate) struct Near {
     /// Walls beyond the ends of what was seen of them.
     assumed: Vec<(Time, Point2<f64>)>,
     place: Option<Pose2>,
-    /// Where the robot has been since when, and when it was last heard of.
-    stay: Option<(Pose2, Time, Time)>,
+    /// Where the robot has been, and since when.
+    stay: Option<(Pose2, Time)>,
     /// The walls of each floor of the map, and those points of them that are near now.
     floors: Vec<(i32, Vec<Segment>)>,
     walls: Vec<Point2<f64>>,
@@ -210,11 +212,16 @@ impl Near {
     pub(crate) fn tell(&mut self, motion: Option<Motion>, hull: &Hull) -> (Option<Pose2>, &[NearPoint]) {
         self.points.clear();
         let Some(here) = motion.map(|motion| motion.pose) else { return (None, &self.points) };
-        let seen = self.sightings.iter().chain(self.rims.iter()).map(|sighting| sighting.place);
-        let places =
-            seen.chain(self.assumed.iter().map(|(_, place)| *place)).chain(self.walls.iter().copied());
         let frame = here.frame();
-        let local = places.map(|place| frame.inverse_transform(place));
+        let farther = |place: Point2<f64>| {
+            Point2::new(place.x + OLD_FARTHER_M.copysign(place.x), place.y + OLD_FARTHER_M.copysign(place.y))
+        };
+        let seen = self.sightings.iter().chain(self.rims.iter()).map(|sighting| {
+            let place = frame.inverse_transform(sighting.place);
+            if sighting.is_old { farther(place) } else { place }
+        });
+        let others = self.assumed.iter().map(|(_, place)| *place).chain(self.walls.iter().copied());
+        let local = seen.chain(others.map(|place| frame.inverse_transform(place)));
         let mut near: Vec<(f64, Point2<f64>)> = local
             .map(|place| (hull.distance_to_m(place), place))
             .filter(|(distance_m, _)| (1e-9..TOLD_WITHIN_M).contains(distance_m))
@@ -246,7 +253,7 @@ impl Near {
             self.ends.clear();
             self.assumed.clear();
         }
-        self.hold_while_it_stands(now, here, hull);
+        self.keep_while_it_stands(now, here, hull);
         self.sightings.forget(now, here, hull, 0.0);
         self.rims.forget(now, here, hull, 0.0);
         let frame = here.frame();
@@ -254,20 +261,19 @@ impl Near {
         Some(here)
     }
 
-    /// What was seen close to the hull does not grow old while the robot stands: a leg of a chair at a corner of the hull, where no sensor looks, is still there
-    /// when it drives on, however long it was loaded.
-    fn hold_while_it_stands(&mut self, now: Time, here: Pose2, hull: &Hull) {
+    /// What was seen close to the hull is not forgotten while the robot stands: a leg of a chair at a corner of the hull, where no sensor
+    /// looks, is still there when it drives on, however long it was loaded.
+    fn keep_while_it_stands(&mut self, now: Time, here: Pose2, hull: &Hull) {
         let is_near = |there: Pose2| {
             there.distance_m(here) <= STANDS_WITHIN_M
                 && angle::difference(there.heading_rad, here.heading_rad).abs() <= STANDS_WITHIN_RAD
         };
-        let (there, since, heard) = self.stay.filter(|stay| is_near(stay.0)).unwrap_or((here, now, now));
-        self.stay = Some((there, since, now));
+        let (there, since) = self.stay.filter(|stay| is_near(stay.0)).unwrap_or((here, now));
+        self.stay = Some((there, since));
         if now.seconds_since(since) > STANDS_AFTER_S {
             let frame = here.frame();
-            let is_near = |place| hull.distance_to_m(frame.inverse_transform(place)) <= HELD_WITHIN_M;
-            self.sightings.hold_where(now.since(heard), is_near);
-            self.rims.hold_where(now.since(heard), is_near);
+            let is_kept = |place| hull.distance_to_m(frame.inverse_transform(place)) <= HELD_WITHIN_M;
+            self.sightings.keep_old(now, is_kept);
         }
     }
 
