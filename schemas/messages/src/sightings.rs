@@ -121,10 +121,10 @@ impl Sightings {
         }
     }
 
-    /// Keeps what lies at such places, when it would be forgotten for its age, and marks it as old.
+    /// Keeps what lies at such places for as long again, once, when it would be forgotten for its age, and marks it as old.
     pub fn keep_old(&mut self, now: Time, is_kept: impl Fn(Point2<f64>) -> bool) {
         for point in self.points.iter_mut().filter(|point| now.seconds_since(point.seen) > KEPT_S) {
-            if is_kept(point.place) {
+            if !point.is_old && is_kept(point.place) {
                 (point.seen, point.is_old) = (now, true);
             }
         }

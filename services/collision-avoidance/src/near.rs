@@ -261,8 +261,9 @@ impl Near {
         Some(here)
     }
 
-    /// What was seen close to the hull is not forgotten while the robot stands: a leg of a chair at a corner of the hull, where no sensor
-    /// looks, is still there when it drives on, however long it was loaded.
+    /// What was seen close to the hull is remembered for longer while the robot stands: a leg of a chair at a corner of the hull, where no
+    /// sensor looks, is still there when it drives on. Not for ever: in a narrow door the edge of a cone makes out what is not there, and
+    /// only time takes that away.
     fn keep_while_it_stands(&mut self, now: Time, here: Pose2, hull: &Hull) {
         let is_near = |there: Pose2| {
             there.distance_m(here) <= STANDS_WITHIN_M

@@ -86,14 +86,15 @@ fn check_remembered(frames: usize, at: impl Fn(usize) -> Pose2, is_there: bool) 
 }
 
 #[test]
-fn what_was_seen_does_not_grow_old_while_the_robot_stands() {
+fn what_was_seen_is_remembered_for_longer_while_the_robot_stands() {
     let stands = |_| Pose2::new(0.3, 0.0, 0.0);
     let trembles = |frame: usize| Pose2::new(0.3, 0.0, if frame.is_multiple_of(2) { 0.01 } else { -0.01 });
     let goes_to_and_fro = |frame: usize| Pose2::new(0.3 + 0.05 * (frame / 10 % 2) as f64, 0.0, 0.0);
-    check_remembered(2400, stands, true);
-    check_remembered(2400, trembles, true);
+    check_remembered(700, stands, true);
+    check_remembered(700, trembles, true);
+    check_remembered(900, stands, false);
     check_remembered(300, goes_to_and_fro, true);
-    check_remembered(2400, goes_to_and_fro, false);
+    check_remembered(700, goes_to_and_fro, false);
 }
 
 /// What the sensors of a robot at `pose` see of a long wall along the line y = `wall_y_m`, in the middle of their cones.
