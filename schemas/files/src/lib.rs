@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// A file that cannot be used. The text names the file.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", path.display())]
+#[error("{}: {problem}", shown(path))]
 pub struct FileError {
     /// The file.
     pub path: PathBuf,
@@ -74,6 +74,14 @@ pub fn bytes_in_words(bytes: u64) -> String {
         Some((unit, name)) => format!("{:.1} {name}", bytes as f64 / unit as f64),
         None => format!("{bytes} bytes"),
     }
+}
+
+/// The longest path that the system takes, in bytes.
+const PATH_MAX: usize = 4096;
+
+/// A path for a sentence about it. One that a file of the user's has made up may be endless.
+pub fn shown(path: &Path) -> String {
+    clipped(&path.display().to_string(), PATH_MAX)
 }
 
 /// Text of a file for a sentence about it: if it is long, its first 80 characters and its size.

@@ -176,3 +176,9 @@ fn long_texts_are_quoted_in_brief() {
     // Never in the middle of a character.
     assert_eq!(clipped("\u{e4}\u{f6}\u{fc}", 2), "\u{e4}\u{f6} .. (6 bytes in all)");
 }
+
+#[test]
+fn a_path_that_a_file_has_made_up_is_quoted_in_brief() {
+    let error = read_text(Path::new(&"p.".repeat(200_000)), 1 << 20).unwrap_err().to_string();
+    assert!(error.len() < 5000 && error.contains("390.6 KiB in all"), "{} bytes", error.len());
+}

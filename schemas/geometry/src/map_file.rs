@@ -79,7 +79,7 @@ pub struct MapHeader {
 
 /// A map file that cannot be used. The text names the file.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", path.display())]
+#[error("{}: {problem}", files::shown(path))]
 pub struct MapError {
     /// The file that is wrong: the YAML or the image.
     pub path: PathBuf,

@@ -68,7 +68,7 @@ pub struct World {
 #[derive(Debug, thiserror::Error)]
 pub enum WorldError {
     /// The file cannot be read.
-    #[error("cannot read the world file {}: {cause}", path.display())]
+    #[error("cannot read the world file {}: {cause}", files::shown(path))]
     Unreadable {
         /// The file.
         path: PathBuf,
