@@ -10,7 +10,7 @@ use toml::{Table, Value};
 
 /// What a variant is called that changes nothing.
 const UNCHANGED: &str = "as the graph is";
-
+/// The largest experiment of ours has 3 KiB.
 const FILE_MAX: u64 = 1 << 20;
 /// What the runs of an experiment change, in bytes, all together.
 const CHANGES_MAX: usize = 256 << 20;

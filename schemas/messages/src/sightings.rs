@@ -34,7 +34,7 @@ pub struct Sighting {
     pub seen: Time,
     /// How many readings have to pass through it until it is gone.
     pub weight: u8,
-    /// Whether it would have been forgotten, had it not been held.
+    /// Whether it would have been forgotten, had it not been kept by [`Sightings::keep_old`].
     pub is_old: bool,
 }
 

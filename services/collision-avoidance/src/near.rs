@@ -21,7 +21,7 @@ const STANDS_WITHIN_RAD: f64 = 0.05;
 const STANDS_AFTER_S: f64 = 1.0;
 /// What lies so near to the hull can be touched by a turn before a sensor sees it. When it is old it counts as so much farther to the front
 /// and to the side: a reading says to a few centimetres only where in its cone a thing is, and the robot may pass what it may not turn into.
-const HELD_WITHIN_M: f64 = 0.15;
+const KEPT_WITHIN_M: f64 = 0.15;
 const OLD_FARTHER_M: f64 = 0.025;
 /// In another frame, or after an unseen journey, places mean nothing.
 const JUMP_M: f64 = 0.5;
@@ -273,7 +273,7 @@ impl Near {
         self.stay = Some((there, since));
         if now.seconds_since(since) > STANDS_AFTER_S {
             let frame = here.frame();
-            let is_kept = |place| hull.distance_to_m(frame.inverse_transform(place)) <= HELD_WITHIN_M;
+            let is_kept = |place| hull.distance_to_m(frame.inverse_transform(place)) <= KEPT_WITHIN_M;
             self.sightings.keep_old(now, is_kept);
         }
     }
