@@ -6,7 +6,7 @@ use tests::Graph;
 
 #[test]
 fn an_order_sets_the_robot_off() {
-    // `launch/graphs/coffee.toml` without an order, in logical time: the same messages in every run of this test.
+    // `launch/graphs/coffee.toml` without an order, in logical time: every run sees the same messages.
     let graph =
         Graph::load("coffee").set("navigator.default_order", "").set("base-driver.launch.restart", false);
     let graph = graph.lockstep(7).start();

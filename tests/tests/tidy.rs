@@ -321,3 +321,31 @@ fn tags_are_found() {
     let found = tags("(COF-047..049, X-26); see note 2.6. XX-12, X-1 and COF-, note that 3 are none");
     assert_eq!(found.into_iter().collect::<Vec<_>>(), ["COF-047", "X-26", "note 2.6"]);
 }
+
+/// Columns of prose and of comments.
+const COLUMNS: usize = 110;
+
+/// The lines of a text that are longer than they should be.
+fn long_lines(text: &str) -> Vec<usize> {
+    let lines = text.lines().zip(1..);
+    lines.filter(|(line, _)| line.chars().count() > COLUMNS).map(|(_, number)| number).collect()
+}
+
+#[test]
+fn documents_have_short_lines() {
+    let mut looked = 0;
+    for file in fs::read_dir(root()).unwrap().map(|entry| entry.unwrap().path()) {
+        if file.extension().is_some_and(|end| end == "md") {
+            let long = long_lines(&fs::read_to_string(&file).unwrap());
+            assert!(long.is_empty(), "{}: lines {long:?} have over {COLUMNS} columns", file.display());
+            looked += 1;
+        }
+    }
+    assert!(looked >= 6, "{looked} documents were found");
+}
+
+#[test]
+fn long_lines_are_found() {
+    let (fits, too_long) = ("ä".repeat(COLUMNS), "ä".repeat(COLUMNS + 1));
+    assert_eq!(long_lines(&format!("{fits}\n{too_long}\n\n{fits}")), [2]);
+}
