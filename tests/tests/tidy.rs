@@ -249,11 +249,13 @@ fn the_top_level_is_the_agreed_one() {
         "LICENSE-MIT",
         "board",
         "clippy.toml",
+        "deny.toml",
         "launch",
         "rustfmt.toml",
         "schemas",
         "services",
         "tests",
+        "typos.toml",
         "target",
         // Of experiments and pictures; git leaves it out.
         "results",
