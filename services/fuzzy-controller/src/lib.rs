@@ -210,7 +210,7 @@ impl FuzzyController {
         let allowed = self.surround.allowed(slow_enough, may_advance, &self.params);
         self.surround.judge(now, slow_enough, allowed, wanted.behaviour == Behaviour::BadInput);
         let change_mps =
-            if wanted.at_once { f64::INFINITY } else { self.params.acceleration_mps2 * elapsed_s };
+            if wanted.at_once { f64::INFINITY } else { self.params.acceleration_m_per_s2 * elapsed_s };
         self.wheels = eased(self.wheels, allowed, change_mps);
         let [left_mps, right_mps] = self.wheels;
 
@@ -350,7 +350,7 @@ impl FuzzyController {
     /// The speed from which the robot stops before it must brake (note 2.5), and never less than a creep.
     fn speed_before_mps(&self, front_m: f64) -> f64 {
         let room_m = (front_m - self.params.brake_distance_m).max(0.0);
-        let (brake, latency) = (self.params.brake_mps2, self.params.latency_s);
+        let (brake, latency) = (self.params.brake_m_per_s2, self.params.latency_s);
         let lost = brake * latency;
         ((lost * lost + 2.0 * brake * room_m).sqrt() - lost).max(self.params.creep_speed_mps)
     }

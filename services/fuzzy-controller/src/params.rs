@@ -38,7 +38,7 @@ pub struct Params {
     pub rules_top_speed_mps: f64,
     /// The most that a wheel's speed changes in a second, stops apart.
     #[schemars(range(min = 0.01, max = 20.0))]
-    pub acceleration_mps2: f64,
+    pub acceleration_m_per_s2: f64,
     /// Time between two steps.
     #[schemars(range(min = 1, max = 1000))]
     pub period_ms: u64,
@@ -97,7 +97,7 @@ pub struct Params {
     pub keep_away_m: f64,
     /// Deceleration of the drive, for the speed ahead of obstacles (note 2.5).
     #[schemars(range(min = 0.01, max = 20.0))]
-    pub brake_mps2: f64,
+    pub brake_m_per_s2: f64,
     /// Time from a reading to the wheels.
     #[schemars(range(min = 0.0, max = 5.0))]
     pub latency_s: f64,
@@ -140,7 +140,7 @@ impl Default for Params {
             track_m: 0.536,
             top_speed_mps: 0.47,
             rules_top_speed_mps: 0.47,
-            acceleration_mps2: 0.3,
+            acceleration_m_per_s2: 0.3,
             period_ms: 50,
             input_max_age_ms: 500,
             command_max_age_ms: 1000,
@@ -160,7 +160,7 @@ impl Default for Params {
             brake_distance_m: 0.2,
             turns_by_path: false,
             keep_away_m: 0.0,
-            brake_mps2: 0.5,
+            brake_m_per_s2: 0.5,
             latency_s: 0.2,
             lateral_factor: 1.5,
             goal_without_avoidance_m: 0.3,

@@ -72,7 +72,7 @@ impl Docking {
     pub(crate) fn step(&mut self, view: &DockingView, params: &Params) -> DockingStep {
         let Some(offset_m) = self.offset_m(view, params) else { return self.search(view, params) };
         let near_m =
-            view.speed_mps.powi(2) / (2.0 * params.brake_mps2) + view.speed_mps.abs() * params.latency_s;
+            view.speed_mps.powi(2) / (2.0 * params.brake_m_per_s2) + view.speed_mps.abs() * params.latency_s;
         if let Some(halted) = self.halted {
             if view.now.seconds_since(halted) < SETTLE_S {
                 return DockingStep::Hold;

@@ -60,7 +60,7 @@ pub struct Params {
     pub back_off_speed_mps: f64,
     /// Deceleration of the drive (note 2.5).
     #[schemars(range(min = 0.1, max = 5.0))]
-    pub brake_mps2: f64,
+    pub brake_m_per_s2: f64,
     /// Time from a command to the wheels (note 2.5).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub latency_s: f64,
@@ -116,7 +116,7 @@ impl Default for Params {
             creep_speed_mps: 0.15,
             crawl_speed_mps: 0.04,
             back_off_speed_mps: 0.1,
-            brake_mps2: 0.5,
+            brake_m_per_s2: 0.5,
             latency_s: 0.2,
             load_s: 3.0,
             dwell_s: 3.0,

@@ -119,7 +119,7 @@ impl WindowController {
             // At once, whatever the acceleration.
             Behaviour::BadInput | Behaviour::Brake => (f64::INFINITY, f64::INFINITY),
             _ => (
-                self.params.acceleration_mps2 * elapsed_s,
+                self.params.acceleration_m_per_s2 * elapsed_s,
                 self.params.turn_acceleration_rad_per_s2 * elapsed_s,
             ),
         };
@@ -198,7 +198,7 @@ impl WindowController {
 
     /// What was commanded last, unless the wheels do something else: then what they do.
     fn present(&self, (forward_mps, turn_rad_per_s): (f64, f64)) -> Velocity {
-        let lag_mps = LAG_S * self.params.acceleration_mps2;
+        let lag_mps = LAG_S * self.params.acceleration_m_per_s2;
         let lag_rad_per_s = LAG_S * self.params.turn_acceleration_rad_per_s2;
         Velocity {
             forward_mps: self.commanded.forward_mps.clamp(forward_mps - lag_mps, forward_mps + lag_mps),
@@ -233,7 +233,7 @@ impl WindowController {
         self.rotating = begins || (self.rotating && error_rad.abs() > self.params.rotation_end_rad);
         let points = self.memory.points(now, pose, &self.params);
         // Near the goal no faster than the brakes allow; with something close ahead not at all.
-        let arrival_mps = (self.params.brake_mps2 * aim.way_m).sqrt().max(self.params.rotation_least_mps);
+        let arrival_mps = (self.params.brake_m_per_s2 * aim.way_m).sqrt().max(self.params.rotation_least_mps);
         let is_close = front_m < self.params.brake_distance_m;
         if is_close && present.forward_mps > self.params.rotation_least_mps {
             return Some((Behaviour::Brake, Velocity::default()));

@@ -16,7 +16,7 @@ pub struct Params {
     pub top_speed_mps: f64,
     /// The most that the speed forward changes in a second, stops apart: half of the window's height.
     #[schemars(range(min = 0.01, max = 20.0))]
-    pub acceleration_mps2: f64,
+    pub acceleration_m_per_s2: f64,
     /// The most that the turning speed changes in a second: half of the window's width.
     #[schemars(range(min = 0.05, max = 50.0))]
     pub turn_acceleration_rad_per_s2: f64,
@@ -25,7 +25,7 @@ pub struct Params {
     pub top_turn_rad_per_s: f64,
     /// Speeds from which this deceleration does not stop before the obstacle are not admissible (note 2.5).
     #[schemars(range(min = 0.01, max = 20.0))]
-    pub brake_mps2: f64,
+    pub brake_m_per_s2: f64,
     /// Time from a command to the wheels (note 2.5).
     #[schemars(range(min = 0.0, max = 2.0))]
     pub latency_s: f64,
@@ -99,10 +99,10 @@ impl Default for Params {
         Self {
             track_m: 0.40,
             top_speed_mps: 0.36,
-            acceleration_mps2: 0.4,
+            acceleration_m_per_s2: 0.4,
             turn_acceleration_rad_per_s2: 2.0,
             top_turn_rad_per_s: 1.0,
-            brake_mps2: 0.5,
+            brake_m_per_s2: 0.5,
             latency_s: 0.2,
             period_ms: 50,
             input_max_age_ms: 500,

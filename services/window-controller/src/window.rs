@@ -92,7 +92,7 @@ pub(crate) struct Scene<'a> {
 
 /// The admissible velocity within the window that the objective likes best; `None` when none is.
 pub(crate) fn choose(scene: &Scene<'_>, params: &Params) -> Option<Velocity> {
-    let reach_mps = params.acceleration_mps2 * scene.elapsed_s;
+    let reach_mps = params.acceleration_m_per_s2 * scene.elapsed_s;
     let reach_rad_per_s = params.turn_acceleration_rad_per_s2 * scene.elapsed_s;
     let top_mps = scene.limit_mps.min(params.top_speed_mps).max(0.0);
     // Too fast for a lower limit: slow down as fast as the window allows.
@@ -136,7 +136,7 @@ fn objective(velocity: Velocity, scene: &Scene<'_>, params: &Params) -> Option<f
     }
     let time_s = time_to_contact(velocity, scene, params);
     let way_m = forward_mps * time_s;
-    if way_m < forward_mps * params.latency_s + forward_mps.powi(2) / (2.0 * params.brake_mps2) {
+    if way_m < forward_mps * params.latency_s + forward_mps.powi(2) / (2.0 * params.brake_m_per_s2) {
         return None;
     }
     let turn_way_rad = turn_rad_per_s.abs() * time_s;
