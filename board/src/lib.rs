@@ -1,7 +1,44 @@
 //! The message board: zero-copy publish and subscribe over shared memory.
 //!
-//! A service writes `fn main()` with [`run`] and declares its ports on the [`Node`]; everything else here is for the launcher and for tools.
-//! This is the only crate that knows the transport, signals and the clock.
+//! A service writes its `main` with [`run`]: the closure that it gives declares ports on the [`Node`] and
+//! returns the step. The same closure answers `--interface`, so that a launcher can check a graph before
+//! anything starts.
+//!
+//! ```no_run
+//! use messages::{Misfit, Odometry, Parameters, RunSummary};
+//! use schemars::JsonSchema;
+//! use serde::{Deserialize, Serialize};
+//! use std::process::ExitCode;
+//!
+//! /// What can be adjusted.
+//! #[derive(Debug, Clone, Default, Serialize, Deserialize, JsonSchema)]
+//! #[serde(deny_unknown_fields, default)]
+//! struct Params {
+//!     /// A robot that is faster than this drives.
+//!     #[schemars(range(min = 0.0, max = 2.0))]
+//!     standstill_mps: f64,
+//! }
+//!
+//! impl Parameters for Params {
+//!     type Error = Misfit;
+//! }
+//!
+//! fn main() -> ExitCode {
+//!     board::run(board::about!(), |node, params: Params| {
+//!         let mut odometry = node.latest::<Odometry>("wheels/odometry")?;
+//!         let mut summary = node.publisher::<RunSummary>("run/summary")?;
+//!         node.wake_on(&odometry);
+//!         Ok(move |_now| {
+//!             if odometry.read().is_some_and(|odometry| odometry.forward_mps > params.standstill_mps) {
+//!                 summary.publish(&RunSummary::default());
+//!             }
+//!         })
+//!     })
+//! }
+//! ```
+//!
+//! Everything else here is for the launcher ([`host`], [`switchboard`], [`gate`]) and for tools ([`tap`],
+//! [`place`], [`manifest`]). This is the only crate that knows the transport, signals and the clock.
 
 pub mod arguments;
 pub mod clock;

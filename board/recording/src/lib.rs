@@ -5,6 +5,38 @@
 //! know lies beside it where they do not look: the table of contents with the descriptions of all messages as
 //! metadata, and the rest of the envelope in private records (see [`mod@format`]). The crate knows neither
 //! the board nor the clock: moments come in as arguments.
+//!
+//! ```
+//! use messages::{Message as _, RunSummary, View};
+//! use recording::{Envelope, Manifest, Recorder, Recording, Topic};
+//! use zerocopy::IntoBytes as _;
+//!
+//! # let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("run.mcap");
+//! let topic = Topic {
+//!     name: "run/summary".to_owned(),
+//!     publisher: Some("referee".to_owned()),
+//!     readers: Vec::new(),
+//!     depth: 1,
+//!     elements: 0,
+//!     message: RunSummary::description(),
+//! };
+//! let graph = "coffee".to_owned();
+//! let manifest = Manifest { graph, seed: 7, topics: vec![topic], ..Manifest::default() };
+//!
+//! let mut recorder = Recorder::new(&path, &manifest)?;
+//! let envelope = Envelope { stamp_ns: 5_000_000, sequence: 1, ..Envelope::default() };
+//! recorder.record(0, &envelope, RunSummary::default().as_bytes())?;
+//! recorder.finish()?;
+//!
+//! let recording = Recording::open(&path)?;
+//! for message in recording.in_order(|topic| topic.name == "run/summary") {
+//!     let message = message?;
+//!     let view: View<'_, RunSummary> = View::parse(message.bytes())?;
+//!     println!("{} ns: {:?}", message.envelope.stamp_ns, view.message);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod format;
 

@@ -5,6 +5,21 @@
 //! instead of waited for, and nothing is taken into memory that is larger than its reader has allowed for.
 //! What is written appears under its name only when all of it is on the disk, and takes the place of nothing
 //! but a plain file.
+//!
+//! ```
+//! use std::io::Write as _;
+//!
+//! # let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("limits.toml");
+//! files::Draft::write(&path, |file| writeln!(file, "top_speed_mps = 0.3"))?.put()?;
+//!
+//! let table: toml::Table = files::toml::parse(&files::read_text(&path, 1024)?)?;
+//! assert_eq!(table["top_speed_mps"].as_float(), Some(0.3));
+//!
+//! let error = files::read_text(&path, 4).unwrap_err();
+//! assert!(error.to_string().contains("which is the limit"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod read;
 pub mod toml;
@@ -89,7 +104,7 @@ pub fn in_brief(text: &str) -> String {
     clipped(text, 80)
 }
 
-/// At most so many characters of a text, and its size if that is not all.
+/// The first characters of a text, and its size if that is not all.
 pub fn clipped(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
         None => text.to_owned(),

@@ -1,6 +1,24 @@
 //! Poses, angles, polygons, grids, worlds, ray and cone casting: pure mathematics on nalgebra and parry.
 //!
-//! Frames: x forward, y left, z up; angles counter-clockwise; maps are right-handed. Units: metres and radians.
+//! Frames: x forward, y left, z up; angles counter-clockwise; maps are right-handed. Units: metres and
+//! radians.
+//!
+//! ```
+//! use geometry::{Point2, Pose2, Segment, Walls};
+//! use std::f64::consts::FRAC_PI_2;
+//!
+//! // A robot at (2, 1) that faces along y, and a wall 3 m ahead of it.
+//! let robot = Pose2::new(2.0, 1.0, FRAC_PI_2);
+//! let walls = Walls::new([Segment::between([0.0, 4.0], [5.0, 4.0])]);
+//!
+//! let hit = walls.cast(robot.position(), robot.heading_rad, 10.0).expect("there is a wall");
+//! assert!((hit.range_m - 3.0).abs() < 1e-9);
+//! // One metre ahead of the robot, in the frame of the map.
+//! assert!((robot.transform(Point2::new(1.0, 0.0)) - Point2::new(2.0, 2.0)).norm() < 1e-9);
+//! ```
+//!
+//! [`World`] reads the floor plans of `launch/worlds`, [`OccupancyGrid`] the maps of ROS. A [`Scene`] is what
+//! simulated sensors look at: walls and bodies, by [`Ray`] and by [`Cone`].
 
 pub mod angle;
 mod body;

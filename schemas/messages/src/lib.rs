@@ -1,8 +1,33 @@
 //! The messages of Corkboard: plain bytes with units, frames and limits, which describe themselves.
 //!
-//! A message is a `#[repr(C)]` struct without padding in which every bit pattern is valid (`zerocopy` proves both at compile
-//! time), so a message from a broken or hostile process may be nonsense and is never undefined behaviour. One declaration gives
-//! the type, its fingerprint, its JSON and its schema for recordings.
+//! A message is a `#[repr(C)]` struct without padding in which every bit pattern is valid (`zerocopy` proves
+//! both at compile time), so a message from a broken or hostile process may be nonsense and is never
+//! undefined behaviour. One declaration gives the type, its fingerprint, its JSON and its schema for
+//! recordings.
+//!
+//! ```
+//! use messages::Message;
+//! use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
+//!
+//! /// How warm it is. Published by `thermometer` on `air/temperature`.
+//! #[derive(Debug, Clone, Copy, Default, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
+//! #[repr(C)]
+//! struct AirTemperature {
+//!     /// In the shade; NaN when unknown.
+//!     air_c: f64,
+//!     /// Height of the sensor above the floor.
+//!     height_m: f64,
+//! }
+//!
+//! let description = AirTemperature::description();
+//! assert_eq!(description.fields[1].unit, "m");
+//! let json = description.to_json(AirTemperature { air_c: 21.5, height_m: 0.5 }.as_bytes());
+//! assert_eq!(json, serde_json::json!({ "air_c": 21.5, "height_m": 0.5 }));
+//! ```
+//!
+//! The messages of the robots stand in files by subject; [`catalogue`] lists them. What lies around a message
+//! is its [`Envelope`]; a step reads it as [`Stamped`]. The [`Parameters`] of a service are checked here too,
+//! by the [`Schema`] that they derive.
 
 // The derive writes `::messages::..`, also for the messages of this very crate.
 extern crate self as messages;

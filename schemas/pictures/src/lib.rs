@@ -1,6 +1,24 @@
-//! Drawings as SVG that say what they show. A [`Sheet`] has a title and one or more [`Plan`]s to scale, each
-//! with axes in metres, a scale bar and a legend; a chart of another kind is drawn on a `canvas` with the
-//! same [`ticks`], `legend` and colours. [`lacks`] says what a drawing leaves its reader to guess.
+//! Drawings as SVG that say what they show: for plots of experiments, for examples and for tests.
+//!
+//! A [`Sheet`] has a title and one or more [`Plan`]s to scale, each with axes in metres, a scale bar and a
+//! legend; a chart of another kind is drawn on a [`Canvas`] with the same [`ticks`], [`Legend`] and
+//! [`colours`]. [`lacks`] says what a drawing leaves its reader to guess.
+//!
+//! ```
+//! use geometry::Point2;
+//! use pictures::{Glyph, Layer, Plan, Sheet, colours};
+//!
+//! let (low, high) = (Point2::new(0.0, 0.0), Point2::new(4.0, 3.0));
+//! let way = vec![Point2::new(0.5, 0.5), Point2::new(2.0, 2.5), Point2::new(3.5, 2.0)];
+//! let plan = Plan::new("Plan", low, high, [400.0, 300.0])
+//!     .with(Layer::lines("way", colours::BLUE, 2.0, vec![way.clone()]))
+//!     .with(Layer::places("waypoints", colours::VERMILLION, Glyph::Dot(4.0), way));
+//! let svg = Sheet::new("A way", "One plan, seed 7").with(plan).svg()?;
+//!
+//! assert!(svg.starts_with("<svg"));
+//! assert_eq!(pictures::lacks(&svg, &["waypoints"]), Vec::<String>::new());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod canvas;
 mod lacks;
