@@ -1,8 +1,9 @@
-//! Round trips between two processes: the board as services use it, the bare transport with the same settings,
-//! the same with a stamp that is written and looked at, and a bare futex as the floor.
+//! Round trips between two processes: the board as services use it, the bare transport with the same
+//! settings, the same with a stamp that is written and looked at, and a bare futex as the floor.
 //!
-//! All in one run and in turn, block by block, so that whatever else the machine does hits all alike. Polling: both sides look for the
-//! newest message without a pause. Waiting: both sleep until they are woken. Each side touches three bytes of the message.
+//! All in one run and in turn, block by block, so that whatever else the machine does hits all alike.
+//! Polling: both sides look for the newest message without a pause. Waiting: both sleep until they are woken.
+//! Each side touches three bytes of the message.
 //! `cargo bench -p board --bench round_trip [-- [BLOCKS] [polling|waiting]]`
 
 use board::host::Host;

@@ -1,5 +1,5 @@
-//! What the coffee graph costs: time from `up` to all services ready, memory of each process, processor while it waits for an order, and the speed
-//! of a delivery in logical time. `cargo bench -p tests`
+//! What the coffee graph costs: time from `up` to all services ready, memory of each process, processor while
+//! it waits for an order, and the speed of a delivery in logical time. `cargo bench -p tests`
 
 use board::clock;
 use std::process::Command;
@@ -59,7 +59,8 @@ fn recording() {
     );
 }
 
-/// As the launcher says: from the beginning of `up`, after the check, to the last service's first look at the board; and the whole command before it.
+/// As the launcher says: from the beginning of `up`, after the check, to the last service's first look at the
+/// board; and the whole command before it.
 fn time_to_ready_ms() -> f64 {
     let began = clock::monotonic();
     let graph = Graph::load("coffee").set("navigator.default_order", "").without_recording().start();

@@ -1,4 +1,5 @@
-//! What a swap costs a robot that drives: controller, planner and localiser, a hundred times. `cargo bench -p tests --bench swap`
+//! What a swap costs a robot that drives: controller, planner and localiser, a hundred times.
+//! `cargo bench -p tests --bench swap`
 
 use board::clock;
 use board::place::Place;

@@ -1,7 +1,8 @@
-//! Messages that nobody meant, on every topic of a living robot: `cargo run --release -p tests --example raw-messages -- --messages 2000000`.
+//! Messages that nobody meant, on every topic of a living robot:
+//! `cargo run --release -p tests --example raw-messages -- --messages 2000000`.
 //!
-//! A third are random bytes of any length, a third numbers that nobody wants, a third true messages with a few bits turned over. Services may ignore them;
-//! none may die, hang or take a gigabyte.
+//! A third are random bytes of any length, a third numbers that nobody wants, a third true messages with a
+//! few bits turned over. Services may ignore them; none may die, hang or take a gigabyte.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::panic, reason = "a program for the workbench")]
 
 use board::clock;
@@ -13,7 +14,8 @@ use std::process::ExitCode;
 use std::time::Duration;
 use tests::{Graph, Running};
 
-/// Who forges these decides that the run is over: the referee believes the truth and the mission, and the launcher the referee.
+/// Who forges these decides that the run is over: the referee believes the truth and the mission, and the
+/// launcher the referee.
 const ENDS_THE_RUN: [&str; 4] = ["mission/status", "journey/status", "world/truth", "run/summary"];
 /// So many on a topic before the services may breathe.
 const AT_ONCE: u64 = 20;

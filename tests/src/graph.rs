@@ -47,8 +47,8 @@ impl Graph {
         self.with(&["--seed", &seed.to_string()])
     }
 
-    /// Runs it in logical time with this seed. The graph then stands still but for [`Running::advance`] and [`Running::wait_for`]: the same test
-    /// sees the same messages in every run, however busy the machine is.
+    /// Runs it in logical time with this seed. The graph then stands still but for [`Running::advance`] and
+    /// [`Running::wait_for`]: the same test sees the same messages in every run, however busy the machine is.
     pub fn lockstep(self, seed: u64) -> Self {
         Self { in_lockstep: true, ..self.seed(seed) }
     }
@@ -64,7 +64,8 @@ impl Graph {
         self
     }
 
-    /// Starts it on a board of its own and waits until every service is ready; in logical time also until the first instant is over.
+    /// Starts it on a board of its own and waits until every service is ready; in logical time also until the
+    /// first instant is over.
     ///
     /// # Panics
     /// When it does not start, with the launcher's words.

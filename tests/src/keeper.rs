@@ -1,4 +1,5 @@
-//! Keeps a recording of a graph in host time, in a thread of the test; in logical time the launcher does that.
+//! Keeps a recording of a graph in host time, in a thread of the test; in logical time the launcher does
+//! that.
 
 use crate::binaries::target_folder;
 use board::place::Place;

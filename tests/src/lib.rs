@@ -1,8 +1,9 @@
-//! The harness for process graphs: start a graph on a board of its own, talk to it, wait for what it does, kill its services, and leave nothing
-//! behind, also when the test panics.
+//! The harness for process graphs: start a graph on a board of its own, talk to it, wait for what it does,
+//! kill its services, and leave nothing behind, also when the test panics.
 //!
-//! A graph runs in host time, or in logical time with [`Graph::lockstep`]; the same words drive both. A test that fails prints the last messages and log
-//! lines of each service, and keeps the recording of the graph in `target/tmp/failed-graphs`.
+//! A graph runs in host time, or in logical time with [`Graph::lockstep`]; the same words drive both. A test
+//! that fails prints the last messages and log lines of each service, and keeps the recording of the graph in
+//! `target/tmp/failed-graphs`.
 //!
 //! ```no_run
 //! use tests::Graph;

@@ -6,8 +6,8 @@ use serde_json::Value;
 use std::process::Command;
 
 impl Graph {
-    /// Runs the graph in lockstep to its end, on a board of its own, and returns what `launch up --lockstep --json` prints: `run` (`passed`,
-    /// `remark`, `figures`), `digest`, `logical_s`.
+    /// Runs the graph in lockstep to its end, on a board of its own, and returns what
+    /// `launch up --lockstep --json` prints: `run` (`passed`, `remark`, `figures`), `digest`, `logical_s`.
     ///
     /// # Panics
     /// When the run cannot be made; not when it fails.

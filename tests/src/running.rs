@@ -18,7 +18,8 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// A running graph on a board of its own. It is stopped, and its board taken down, when this is dropped, also in a panic.
+/// A running graph on a board of its own. It is stopped, and its board taken down, when this is dropped, also
+/// in a panic.
 pub struct Running {
     pub(crate) board: String,
     place: Place,
@@ -43,7 +44,8 @@ impl std::fmt::Debug for Running {
     }
 }
 
-/// Between two looks at the messages while logical time goes on. No service publishes so often that a reader's places run out.
+/// Between two looks at the messages while logical time goes on. No service publishes so often that a
+/// reader's places run out.
 const SLICE: Duration = Duration::from_millis(10);
 
 #[allow(clippy::panic)]
@@ -204,8 +206,8 @@ impl Running {
         publisher.publish(bytes).unwrap_or_else(|error| panic!("{error}\n{}", self.output()));
     }
 
-    /// Waits until a message on the topic, as JSON, meets the condition, and returns it. The deadline is in logical time for graphs in lockstep, which go on
-    /// only in such calls; they look every 10 ms.
+    /// Waits until a message on the topic, as JSON, meets the condition, and returns it. The deadline is in
+    /// logical time for graphs in lockstep, which go on only in such calls; they look every 10 ms.
     ///
     /// # Panics
     /// When the deadline passes, or a run in logical time ends before.
@@ -295,7 +297,8 @@ impl Running {
         self.launcher.borrow().id()
     }
 
-    /// Lets another service play a role while the graph runs, as `launch swap` does, and returns what it says.
+    /// Lets another service play a role while the graph runs, as `launch swap` does, and returns what it
+    /// says.
     pub fn swap(&self, role: &str, binary: &str) -> Value {
         self.try_swap(role, binary).unwrap_or_else(|| panic!("no swap of `{role}`:\n{}", self.output()))
     }
@@ -309,7 +312,8 @@ impl Running {
         serde_json::from_slice(&output.stdout).ok()
     }
 
-    /// Kills a service (signal 9) and returns the moment. In logical time its successor takes its first step 0.1 s later.
+    /// Kills a service (signal 9) and returns the moment. In logical time its successor takes its first step
+    /// 0.1 s later.
     pub fn kill(&self, role: &str) -> Time {
         if self.steering.is_some() {
             self.order(&format!("kill {role}"));

@@ -1,4 +1,5 @@
-//! A command on a terminal of its own, as a person has it in front of them: the terminal can be typed into, stand still, and be closed.
+//! A command on a terminal of its own, as a person has it in front of them: the terminal can be typed into,
+//! stand still, and be closed.
 
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
@@ -26,7 +27,8 @@ pub struct OnTerminal {
 
 #[allow(clippy::panic)]
 impl OnTerminal {
-    /// Starts a command on a terminal of 160 x 45. What it writes is read by a thread, unless the terminal `stands_still`: then nobody ever reads it.
+    /// Starts a command on a terminal of 160 x 45. What it writes is read by a thread, unless the terminal
+    /// `stands_still`: then nobody ever reads it.
     ///
     /// # Panics
     /// When there is no terminal, or the command cannot be started.
@@ -79,7 +81,8 @@ impl OnTerminal {
         String::from_utf8_lossy(&self.seen.lock().unwrap_or_else(PoisonError::into_inner)).into_owned()
     }
 
-    /// Closes the terminal, as a window is closed or a connection breaks. The kernel tells the process with SIGHUP.
+    /// Closes the terminal, as a window is closed or a connection breaks. The kernel tells the process with
+    /// SIGHUP.
     pub fn close(&mut self) {
         self.closing.store(true, Ordering::Release);
         if let Some(reader) = self.reader.take() {

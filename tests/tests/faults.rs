@@ -1,4 +1,5 @@
-//! Kill any service while the robot drives: the wheels stand unless GO and command are fresh, the service comes back, the coffee arrives.
+//! Kill any service while the robot drives: the wheels stand unless GO and command are fresh, the service
+//! comes back, the coffee arrives.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
 
@@ -8,7 +9,8 @@ use messages::{AppliedWheels, Time};
 use std::time::Duration;
 use tests::{Graph, Running};
 
-/// Services whose death must stop the wheels, with what they publish: without them there is no fresh GO, no fresh command, or nobody to tell the motors.
+/// Services whose death must stop the wheels, with what they publish: without them there is no fresh GO, no
+/// fresh command, or nobody to tell the motors.
 const IN_THE_CHAIN: [(&str, &str); 3] = [
     ("collision-avoidance", "safety/clearance"),
     ("controller", "wheels/desired"),
@@ -114,7 +116,8 @@ fn a_service_that_is_stopped_counts_as_hanging_and_is_started_anew() {
     assert!(graph.output().contains("planner: hangs"), "{}", graph.output());
 }
 
-/// Who forges these decides that the run is over: the referee believes the truth and the mission, and the launcher the referee.
+/// Who forges these decides that the run is over: the referee believes the truth and the mission, and the
+/// launcher the referee.
 const ENDS_THE_RUN: [&str; 3] = ["mission/status", "world/truth", "run/summary"];
 
 #[test]
@@ -158,7 +161,8 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
-    /// Random bytes, or numbers that nobody wants; of the right length, with elements behind, or of any length.
+    /// Random bytes, or numbers that nobody wants; of the right length, with elements behind, or of any
+    /// length.
     fn message(&mut self, size: usize, round: u64) -> Vec<u8> {
         let length = match round % 3 {
             0 => size,

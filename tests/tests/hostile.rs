@@ -1,4 +1,5 @@
-//! A controller that means ill: whatever it asks, the robot touches nothing, and however it breaks down, the old one has the role again and nothing is left.
+//! A controller that means ill: whatever it asks, the robot touches nothing, and however it breaks down, the
+//! old one has the role again and nothing is left.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
 
@@ -36,7 +37,8 @@ fn check_touches_nothing(graph: &str, decent: &str, begins_s: f64) {
             .set("controller.begins_s", begins_s)
             .lockstep(seed)
             .start();
-        // Until the robot is here or there, and as long again as it takes to touch something from anywhere near.
+        // Until the robot is here or there, and as long again as it takes to touch something from anywhere
+        // near.
         graph.advance(Duration::from_secs_f64(begins_s + 8.0));
         let truth = graph.collect("world/truth");
         let (_, last) = truth.last().unwrap();

@@ -1,4 +1,5 @@
-//! The localiser's particles depend on its seed and on what was recorded, not on when the operating system lets it run.
+//! The localiser's particles depend on its seed and on what was recorded, not on when the operating system
+//! lets it run.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on shall stop")]
 

@@ -1,4 +1,5 @@
-//! What happens in logical time happens in every run: slow computers, planned deaths, orders from outside, and tests that go step by step.
+//! What happens in logical time happens in every run: slow computers, planned deaths, orders from outside,
+//! and tests that go step by step.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
 

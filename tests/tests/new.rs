@@ -1,4 +1,5 @@
-//! A service of one's own: written by `launch new` outside of this workspace, built, tested, and run in a graph by its path.
+//! A service of one's own: written by `launch new` outside of this workspace, built, tested, and run in a
+//! graph by its path.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
 

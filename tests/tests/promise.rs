@@ -1,4 +1,5 @@
-//! The README's promise, in logical time: what the wheels are told, and what the rims do, when somebody dies or hangs.
+//! The README's promise, in logical time: what the wheels are told, and what the rims do, when somebody dies
+//! or hangs.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on shall stop")]
 
@@ -40,7 +41,8 @@ fn speeds(graph: &Running, topic: &str) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// A moment in whose middle the wheels turn for a while: the same in every run with this seed, up to the wound.
+/// A moment in whose middle the wheels turn for a while: the same in every run with this seed, up to the
+/// wound.
 fn drives_at(graph: &str) -> f64 {
     let running = Graph::load(graph).lockstep(1).start();
     running.advance(Duration::from_secs(14));

@@ -1,4 +1,5 @@
-//! Nothing outside can hold up the launcher: not a terminal, not a client, not a service. The robot heals meanwhile, and stops when it is asked to.
+//! Nothing outside can hold up the launcher: not a terminal, not a client, not a service. The robot heals
+//! meanwhile, and stops when it is asked to.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on shall stop")]
 
@@ -197,7 +198,8 @@ fn clients_that_dawdle_hold_up_nobody() {
     let mut child = Ended(robot.up(&["--plain"]).stdout(Stdio::null()).spawn().unwrap());
     robot.wait_until_driving();
     let socket = robot.place().file("control.sock");
-    // Some say nothing at all, one says a letter at a time, one says too much, and one hangs up in the middle.
+    // Some say nothing at all, one says a letter at a time, one says too much, and one hangs up in the
+    // middle.
     let mut clients: Vec<UnixStream> = (0..300).filter_map(|_| UnixStream::connect(&socket).ok()).collect();
     let mut slow = UnixStream::connect(&socket).unwrap();
     let _ = UnixStream::connect(&socket).map(|mut client| client.write_all(&vec![b'x'; 6 << 20]));

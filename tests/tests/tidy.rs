@@ -351,3 +351,42 @@ fn long_lines_are_found() {
     let (fits, too_long) = ("ä".repeat(COLUMNS), "ä".repeat(COLUMNS + 1));
     assert_eq!(long_lines(&format!("{fits}\n{too_long}\n\n{fits}")), [2]);
 }
+
+/// The lines of a program that are comments, and longer than they should be.
+fn long_comments(text: &str) -> Vec<usize> {
+    let comments: BTreeSet<usize> = text
+        .lines()
+        .zip(1..)
+        .filter(|(line, _)| line.trim_start().starts_with("//"))
+        .map(|(_, number)| number)
+        .collect();
+    long_lines(text).into_iter().filter(|number| comments.contains(number)).collect()
+}
+
+#[test]
+fn comments_have_short_lines() {
+    let root = root();
+    let mut looked = 0;
+    for room in ["board", "launch", "schemas", "services", "tests"] {
+        for file in sources(&root.join(room)) {
+            // Not yet.
+            if file.starts_with(root.join("board/src")) || file.starts_with(root.join("launch/src")) {
+                continue;
+            }
+            let long = long_comments(&fs::read_to_string(&file).unwrap());
+            let file = file.strip_prefix(&root).unwrap().display();
+            assert!(long.is_empty(), "{file}: comments in lines {long:?} have over {COLUMNS} columns");
+            looked += 1;
+        }
+    }
+    assert!(looked > 200, "{looked} files were found");
+}
+
+#[test]
+fn long_comments_are_found() {
+    let long = "/".repeat(COLUMNS + 1);
+    assert_eq!(
+        long_comments(&format!("fn main() {{}}\n    {long}\nlet slashes = \"{long}\";\n// short")),
+        [2]
+    );
+}

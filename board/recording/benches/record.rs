@@ -1,6 +1,7 @@
 //! What recording costs: time a message and bytes a message. `cargo bench -p recording`.
 //!
-//! 500-byte messages of a drive (slow walks with a sensor's noise), and an hour of a graph like the coffee robot's.
+//! 500-byte messages of a drive (slow walks with a sensor's noise), and an hour of a graph like the coffee
+//! robot's.
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 
 use messages::{

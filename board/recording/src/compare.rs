@@ -20,8 +20,8 @@ pub struct Digest {
 
 /// Computes a [`Digest`] from messages as they come.
 ///
-/// It covers stamp, origin, sequence, round and bytes; not the generation, since a run may restart services, and not the topics of the
-/// services' health.
+/// It covers stamp, origin, sequence, round and bytes; not the generation, since a run may restart services,
+/// and not the topics of the services' health.
 #[derive(Debug)]
 pub struct Digester {
     topics: Vec<(String, Hasher, u64)>,
@@ -60,7 +60,8 @@ impl Digester {
 }
 
 impl Recording {
-    /// The digest of the recorded run; the same as that of the run itself when every topic was recorded and nothing was lost.
+    /// The digest of the recorded run; the same as that of the run itself when every topic was recorded and
+    /// nothing was lost.
     ///
     /// # Errors
     /// When the file is damaged.
@@ -103,8 +104,8 @@ pub struct Difference {
     pub round: u32,
     /// The publisher's count of messages.
     pub sequence: u64,
-    /// The field by its path (`anchors[3].range_m`), or what else differs: `stamp_ns`, `origin_ns`, `sequence`, `round`, `layout`, `elements`
-    /// (their number), `message` (one of the runs has none).
+    /// The field by its path (`anchors[3].range_m`), or what else differs: `stamp_ns`, `origin_ns`,
+    /// `sequence`, `round`, `layout`, `elements` (their number), `message` (one of the runs has none).
     pub field: String,
     /// Its value in the first run; null when there is none.
     pub a: Value,
@@ -123,7 +124,8 @@ impl std::fmt::Display for Difference {
     }
 }
 
-/// The first difference between two recordings in logical time, over the topics that both have; `None` when there is none.
+/// The first difference between two recordings in logical time, over the topics that both have; `None` when
+/// there is none.
 ///
 /// # Errors
 /// When a file is damaged.

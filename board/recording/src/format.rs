@@ -1,13 +1,15 @@
-//! What a recording holds beyond plain MCAP. Tools that do not know it skip it, as the MCAP specification asks of them.
+//! What a recording holds beyond plain MCAP. Tools that do not know it skip it, as the MCAP specification
+//! asks of them.
 //!
 //! - Metadata `corkboard`, at the beginning of the file: `manifest` (JSON of [`crate::Manifest`]) and
 //!   `version`. It comes again, longer, when
 //!   topics are added; the last one counts.
 //! - Metadata `corkboard/end`, at the end: notes that were not known at the beginning.
-//! - A message's `log_time` is its stamp, `publish_time` its origin, `sequence` the low 32 bits of its sequence. A private record [`CONTEXT`]
-//!   in the chunk says the rest for the messages of one channel that follow it in that chunk: it is written when it changes, which is seldom, so
-//!   it costs next to nothing.
-//! - A message whose bytes do not fit its type (a broken process can publish any) is kept, bytes and all, in a private record [`MISFIT`].
+//! - A message's `log_time` is its stamp, `publish_time` its origin, `sequence` the low 32 bits of its
+//!   sequence. A private record [`CONTEXT`] in the chunk says the rest for the messages of one channel that
+//!   follow it in that chunk: it is written when it changes, which is seldom, so it costs next to nothing.
+//! - A message whose bytes do not fit its type (a broken process can publish any) is kept, bytes and all, in
+//!   a private record [`MISFIT`].
 //!
 //! All numbers are little-endian.
 
@@ -21,7 +23,8 @@ pub const METADATA_END: &str = "corkboard/end";
 pub const VERSION: &str = "1";
 /// Private record: channel (u16), high half of the sequence (u32), generation (u32), round (u32).
 pub const CONTEXT: u8 = 0x80;
-/// Private record: channel (u16), stamp (u64), origin (u64), sequence (u64), generation (u32), round (u32), the bytes.
+/// Private record: channel (u16), stamp (u64), origin (u64), sequence (u64), generation (u32), round (u32),
+/// the bytes.
 pub const MISFIT: u8 = 0x81;
 
 /// The part of the envelope that an MCAP message has no place for.

@@ -19,7 +19,7 @@ use zerocopy::IntoBytes as _;
 const CHUNK_MAX: u64 = MESSAGE_MAX as u64;
 /// Messages of one chunk: as many as of the shortest fit into one of ours, ten times over.
 const CHUNK_MESSAGES_MAX: usize = 250_000;
-/// A recording that would unpack to more than so much, and to more than so many times its size, is none: it
+/// A recording that would unpack to more than this, and to more than so many times its size, is refused: it
 /// would keep a reader busy for ever. What a robot says shrinks to a tenth; where it says the same map again
 /// and again, to a hundredth.
 const UNPACKED_MAX: u64 = 1 << 30;
@@ -105,7 +105,7 @@ impl Recording {
         while let Some((opcode, record)) = heads.record_at(at).map_err(io())? {
             at = record.end;
             match opcode {
-                // Too large a note is none.
+                // A note that is too large is left out.
                 op::METADATA if record.end - record.start <= METADATA_MAX => {
                     let body = read_range(&file, record.start + HEAD..record.end).map_err(io())?;
                     let Some(Record::Metadata(metadata)) = records::parse(opcode, &body) else { continue };

@@ -1,4 +1,5 @@
-//! Records as the library parses them, once their lengths are known to be true: it takes memory for a text before it reads it, up to 4 GB.
+//! Records as the library parses them, once their lengths are known to be true: it takes memory for a text
+//! before it reads it, up to 4 GB.
 
 use crate::format::take;
 use mcap::records::{Record, op};

@@ -12,7 +12,7 @@ use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// A chunk is closed when it has so many bytes.
+/// A chunk is closed when it has this many bytes.
 const CHUNK_BYTES: usize = 1 << 20;
 /// A chunk is closed when it is so old: more than this is never lost.
 const CHUNK_AGE: Duration = Duration::from_millis(900);
@@ -32,7 +32,8 @@ pub struct Counts {
 
 /// Writes a recording while the board runs.
 ///
-/// Whatever kills the process, the file opens up to its last closed chunk; [`Recorder::tick`] closes one at least each second.
+/// Whatever kills the process, the file opens up to its last closed chunk; [`Recorder::tick`] closes one at
+/// least each second.
 pub struct Recorder {
     path: PathBuf,
     /// Gone when the recording could not go on.
@@ -136,7 +137,8 @@ impl Recorder {
         Ok(index)
     }
 
-    /// Records a message: the topic's place in the manifest, the envelope, and the bytes as they lie in memory.
+    /// Records a message: the topic's place in the manifest, the envelope, and the bytes as they lie in
+    /// memory.
     ///
     /// # Errors
     /// When the file cannot be written, or there is no such topic.
@@ -185,8 +187,8 @@ impl Recorder {
         if self.chunk_bytes >= CHUNK_BYTES { self.flush() } else { Ok(()) }
     }
 
-    /// Closes the present chunk when it is old: to be called a few times a second, also while no message comes. `now` is any clock that runs on
-    /// in real time.
+    /// Closes the present chunk when it is old: to be called a few times a second, also while no message
+    /// comes. `now` is any clock that runs on in real time.
     ///
     /// # Errors
     /// When the file cannot be written.
@@ -300,7 +302,7 @@ fn add_channel(
     writer.add_channel_with_id(channel(index), schema, &topic, "cdr", &about).map(|_| ())
 }
 
-/// The channel of a topic. Zero is left out, which some readers take for none.
+/// The channel of a topic. Zero is left out, as some readers take it for no channel.
 fn channel(topic: usize) -> u16 {
     (topic + 1) as u16
 }

@@ -1,4 +1,5 @@
-//! What we record, readers that know nothing of us read the same: Python's `mcap-ros2-support` and `rosbags`, for every message type.
+//! What we record, readers that know nothing of us read the same: Python's `mcap-ros2-support` and `rosbags`,
+//! for every message type.
 
 use messages::{Description, FieldDescription, Kind, catalogue, elements_offset};
 use recording::{Envelope, Manifest, Recorder, Topic};

@@ -211,7 +211,8 @@ pub(crate) fn nothing_is_inherited() {
         files
     };
     let before = files(&mut robot);
-    // What the launcher opens in between is its own. Topics that the service does not know, so that it opens none of it itself.
+    // What the launcher opens in between is its own. Topics that the service does not know, so that it opens
+    // none of it itself.
     let tap = robot.tap();
     let readers = ["scan", "ranges", "seen"].map(|topic| tap.reader(topic).unwrap());
     assert_eq!(files(&mut robot), before);

@@ -37,7 +37,8 @@ pub(crate) fn every_message_wakes_the_reader() {
     let mut tap = robot.tap();
     let count = tap.publisher("count").unwrap();
     let mut relayed = tap.reader("relayed").unwrap();
-    // One at a time: a wake-up that is lost leaves the relay asleep, and the answer comes a heartbeat late at best.
+    // One at a time: a wake-up that is lost leaves the relay asleep, and the answer comes a heartbeat late at
+    // best.
     for number in 1..=20_000 {
         publish(&count, number);
         await_message::<Count>(&tap, &mut relayed, |_, message| message.number == number);
@@ -122,7 +123,8 @@ pub(crate) fn a_large_message_is_read_where_it_was_written() {
 }
 
 pub(crate) fn a_stamp_from_the_future_does_not_count() {
-    // A lockstep clock is whatever its page says: a tap on it can publish with any stamp, and a live service is told that the time is now.
+    // A lockstep clock is whatever its page says: a tap on it can publish with any stamp, and a live service
+    // is told that the time is now.
     let mut robot = Robot::new(&[("relayed", "relay")]);
     robot.start("relay");
     let mut tap = robot.tap();

@@ -1,4 +1,5 @@
-//! A test runner of a few lines: the test binary is also the services that its tests start, so it needs a `main` of its own.
+//! A test runner of a few lines: the test binary is also the services that its tests start, so it needs a
+//! `main` of its own.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
@@ -6,7 +7,8 @@ use std::process::ExitCode;
 /// A test and its name.
 pub(crate) type Case = (&'static str, fn());
 
-/// Runs the tests whose names contain the arguments, one after the other; answers `--list` for runners that ask.
+/// Runs the tests whose names contain the arguments, one after the other; answers `--list` for runners that
+/// ask.
 pub(crate) fn run(cases: &[Case]) -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let has = |flag: &str| arguments.iter().any(|argument| argument == flag);

@@ -56,7 +56,8 @@ pub(crate) fn run(common: &Common) -> Outcome {
     Ok(code)
 }
 
-/// Cleans up after the dead of a board that is up, in a process of its own; false when it had to be broken off.
+/// Cleans up after the dead of a board that is up, in a process of its own; false when it had to be broken
+/// off.
 pub(crate) fn clean_dead(place: &Place) -> io::Result<bool> {
     let mut helper = Command::new(std::env::current_exe()?)
         .args(["clean-dead", place.name()])

@@ -70,7 +70,8 @@ pub(crate) fn look(place: &Place) -> Result<Look, Box<dyn Error>> {
     Ok(Look { manifest, switchboard })
 }
 
-/// A place on the board. Ports of tools that were killed are cleaned up first: nobody else does, and a topic takes only so many.
+/// A place on the board. Ports of tools that were killed are cleaned up first: nobody else does, and a topic
+/// takes only so many.
 pub(crate) fn join(place: &Place) -> Result<Tap, Box<dyn Error>> {
     let dead = Switchboard::open(&place.file("switchboard"))?.dead_tools().count();
     if dead > 0 {
@@ -160,7 +161,7 @@ pub(crate) fn linger(tap: &Tap, watch: &mut Watch) -> io::Result<()> {
 
 /// How often it is looked whether the board is still up.
 const LOOK: Duration = Duration::from_millis(500);
-/// After so long without a message it is said that one is waited for.
+/// After this long without a message it is said that one is waited for.
 const SILENCE: Duration = Duration::from_secs(1);
 
 /// Why a command ends that would go on.

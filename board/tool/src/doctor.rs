@@ -15,7 +15,7 @@ use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-/// A service that has not looked about for so long hangs, or starves.
+/// A service that has not looked about for this long hangs, or starves.
 const SILENT: Duration = Duration::from_secs(1);
 const MIB: u64 = 1024 * 1024;
 
@@ -250,7 +250,8 @@ fn clocks() -> Vec<Finding> {
         ),
         Err(_) => ok("clock", "monotonic"),
     });
-    // Two looks at the clock in a row must not go back, and be less than a scheduler's tick apart more often than not.
+    // Two looks at the clock in a row must not go back, and be less than a scheduler's tick apart more often
+    // than not.
     let gaps: Vec<u128> = (0..100)
         .map(|_| {
             let first = clock::monotonic();

@@ -13,14 +13,14 @@ use std::time::Duration;
 pub(crate) struct Options {
     /// The topic.
     topic: String,
-    /// End after so many messages.
+    /// End after this many messages.
     #[arg(short = 'n', long, value_name = "N")]
     count: Option<u64>,
     /// Print this field only: `pose.x_m`, `elements.3`.
     #[arg(long, value_name = "PATH")]
     field: Option<String>,
-    /// End after so many seconds without a message, with exit code 3 when none came at all, or fewer than -n
-    /// asks for.
+    /// End after this many seconds without a message, with exit code 3 when none came at all, or fewer than
+    /// -n asks for.
     #[arg(long, value_name = "SECONDS", value_parser = arguments::seconds)]
     timeout: Option<Duration>,
 }
@@ -157,7 +157,7 @@ fn rows_of<'a>(
     }
 }
 
-/// The first few of so many items.
+/// The first few of the items.
 fn list(items: &[Value], count: usize) -> String {
     let first: Vec<String> = items.iter().take(SHOWN).map(show::value).collect();
     let more = count.saturating_sub(first.len());

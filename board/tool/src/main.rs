@@ -69,7 +69,8 @@ enum Verb {
     /// Messages per second, periods and jitter.
     #[command(after_help = examples::help(examples::RATE, ""))]
     Rate(rate::RateOptions),
-    /// How old messages are when they arrive: since they were published, and since the sensor reading behind them.
+    /// How old messages are when they arrive: since they were published, and since the sensor reading behind
+    /// them.
     #[command(after_help = examples::help(examples::DELAY, ""))]
     Delay(rate::DelayOptions),
     /// Publish messages by hand.
@@ -79,7 +80,8 @@ enum Verb {
          Where a service publishes, and for wheels/ and safety/ where a service listens, only with --force."
     ))]
     Publish(publish::Options),
-    /// Record messages into a file that also the tools of ROS 2 and Foxglove read; until Ctrl-C, or until the board goes down.
+    /// Record messages into a file that also the tools of ROS 2 and Foxglove read; until Ctrl-C, or until the
+    /// board goes down.
     #[command(after_help = examples::help(examples::RECORD, ""))]
     Record(record::Options),
     /// Publish the messages of a recording, in the name of those who published them.

@@ -125,7 +125,8 @@ fn content(options: &Options, description: &Description) -> Result<Content, Box<
     Ok(Content::Fixed(bytes))
 }
 
-/// Random bytes of the right length; for messages with elements any number of these, and one in four times a length that cannot be.
+/// Random bytes of the right length; for messages with elements any number of these, and one in four times a
+/// length that cannot be.
 fn random_message(random: &mut Pcg64, description: &Description) -> Vec<u8> {
     let length = match &description.element {
         None => description.size,

@@ -17,7 +17,7 @@ pub(crate) struct RateOptions {
     /// Seconds between two reports.
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = arguments::seconds)]
     interval: Duration,
-    /// End after so many reports.
+    /// End after this many reports.
     #[arg(short = 'n', long, value_name = "N")]
     count: Option<u64>,
 }
@@ -29,10 +29,10 @@ pub(crate) struct DelayOptions {
     /// Seconds between two reports.
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = arguments::seconds)]
     interval: Duration,
-    /// End after so many messages.
+    /// End after this many messages.
     #[arg(short = 'n', long, value_name = "N")]
     count: Option<u64>,
-    /// End after so many seconds without a message, with exit code 3.
+    /// End after this many seconds without a message, with exit code 3.
     #[arg(long, value_name = "SECONDS", value_parser = arguments::seconds)]
     timeout: Option<Duration>,
 }

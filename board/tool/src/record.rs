@@ -28,7 +28,7 @@ pub(crate) struct Options {
     /// Overwrite the file if it exists; anything but a plain file is left alone.
     #[arg(long)]
     force: bool,
-    /// End after so many seconds.
+    /// End after this many seconds.
     #[arg(long, value_name = "SECONDS", value_parser = arguments::seconds)]
     duration: Option<Duration>,
 }

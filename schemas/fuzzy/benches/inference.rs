@@ -1,5 +1,5 @@
-//! Time of one inference. The peer's figures on the same kind of machine: fuzzylite 6.0, the same 7 x 7 system, takes 5.7 to
-//! 8.4 us at 100 samples. Run with `cargo bench -p fuzzy-controller`.
+//! Time of one inference. The peer's figures on the same kind of machine: fuzzylite 6.0, the same 7 x 7
+//! system, takes 5.7 to 8.4 us at 100 samples. Run with `cargo bench -p fuzzy-controller`.
 
 use divan::Bencher;
 use fuzzy::{Engine, Integration, Options, fcl};

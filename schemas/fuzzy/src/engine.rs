@@ -54,8 +54,9 @@ impl Engine {
         })
     }
 
-    /// One inference: a value for each input in the system's order, out of it a value for each output. Infinite inputs are
-    /// far away; with a missing input or a NaN no rule fires, and every output takes its default.
+    /// One inference: a value for each input in the system's order, out of it a value for each output.
+    /// Infinite inputs are far away; with a missing input or a NaN no rule fires, and every output takes its
+    /// default.
     pub fn step(&mut self, inputs: &[f64]) -> &[f64] {
         self.premises.evaluate(inputs, self.tolerance);
         for (value, output) in self.values.iter_mut().zip(&mut self.outputs) {
@@ -69,7 +70,8 @@ impl Engine {
         &self.values
     }
 
-    /// The activation of every rule in the last step, weight included, in the order of the rules, block after block.
+    /// The activation of every rule in the last step, weight included, in the order of the rules, block after
+    /// block.
     pub fn activations(&self) -> &[f64] {
         self.premises.activations()
     }
@@ -84,7 +86,8 @@ impl Engine {
         self.premises.membership(input, term)
     }
 
-    /// How an output is defuzzified: `levels` and `walk` are exact, `quadrature` is exact to about 1e-10, `sampled`, `weighted`.
+    /// How an output is defuzzified: `levels` and `walk` are exact, `quadrature` is exact to about 1e-10,
+    /// `sampled`, `weighted`.
     pub fn kernel(&self, output: usize) -> Option<&'static str> {
         self.outputs.get(output).map(OutputPlan::kernel)
     }

@@ -1,16 +1,18 @@
 //! The exact centroid of clipped terms under the maximum (or the plain sum), in closed form.
 //!
-//! A term `f` clipped at `c` has the area `∫₀ᶜ L(s) ds`, where `L(s)` is the length of the places with `f > s`. For straight
-//! flanks `L` is a straight line between the heights of the corners, so area and first moment are polynomials of `c`
-//! there. The maximum over several clipped terms follows by inclusion and exclusion: the minimum over a set of clipped
-//! terms is the minimum of the terms clipped at the smallest degree of the set, a function of straight lines again.
-//! So all geometry is done once, and a step only evaluates a few cubic polynomials: no loop over the universe.
+//! A term `f` clipped at `c` has the area `∫₀ᶜ L(s) ds`, where `L(s)` is the length of the places with
+//! `f > s`. For straight flanks `L` is a straight line between the heights of the corners, so area and first
+//! moment are polynomials of `c` there. The maximum over several clipped terms follows by inclusion and
+//! exclusion: the minimum over a set of clipped terms is the minimum of the terms clipped at the smallest
+//! degree of the set, a function of straight lines again. So all geometry is done once, and a step only
+//! evaluates a few cubic polynomials: no loop over the universe.
 
 use super::norms::{larger, smaller};
 use super::terms::Piece;
 use std::collections::BTreeMap;
 
-/// Overlaps of more terms than this at one place need too many sets; such systems take the walk over pieces instead.
+/// Overlaps of more terms than this at one place need too many sets; such systems take the walk over pieces
+/// instead.
 const MOST_OVERLAPPING: usize = 6;
 const MOST_SETS: usize = 600;
 /// Heights nearer to each other than this are one.
@@ -27,7 +29,8 @@ pub(crate) struct Levels {
     slices: Vec<Slice>,
 }
 
-/// What a set contributes between two heights: polynomials of the height above the lower one, with the set's sign.
+/// What a set contributes between two heights: polynomials of the height above the lower one, with the set's
+/// sign.
 #[derive(Debug, Clone, Copy)]
 struct Slice {
     area: [f64; 2],
@@ -38,8 +41,9 @@ struct Slice {
 }
 
 impl Levels {
-    /// Prepares entries given by their straight parts over the universe, from `low` to `high`. With `overlaps` they
-    /// accumulate by the maximum, otherwise by the sum. `None` if too many of them overlap at one place.
+    /// Prepares entries given by their straight parts over the universe, from `low` to `high`. With
+    /// `overlaps` they accumulate by the maximum, otherwise by the sum. `None` if too many of them overlap at
+    /// one place.
     pub(crate) fn new(entries: &[Vec<Piece>], low: f64, high: f64, overlaps: bool) -> Option<Self> {
         let mut sets: BTreeMap<(usize, Vec<u16>), Vec<Piece>> = BTreeMap::new();
         for cell in cells(entries, overlaps)? {
@@ -166,7 +170,8 @@ fn push_merged(pieces: &mut Vec<Piece>, next: Piece) {
     pieces.push(next);
 }
 
-/// Area and moment about `centre` of a function of straight pieces, by bands between the heights of its corners.
+/// Area and moment about `centre` of a function of straight pieces, by bands between the heights of its
+/// corners.
 fn slices(pieces: &[Piece], centre: f64, sign: f64, source: u32) -> Vec<Slice> {
     let mut heights: Vec<f64> =
         [0.0].into_iter().chain(pieces.iter().flat_map(|piece| [piece.y0, piece.y1])).collect();
@@ -175,7 +180,8 @@ fn slices(pieces: &[Piece], centre: f64, sign: f64, source: u32) -> Vec<Slice> {
     let mut all = Vec::new();
     for band in heights.windows(2) {
         let (low, height) = (band[0], band[1] - band[0]);
-        // Length of the places above a height, and the moment of these places: polynomials of that height over `low`.
+        // Length of the places above a height, and the moment of these places: polynomials of that height
+        // over `low`.
         let (mut length, mut first) = ([0.0; 2], [0.0; 3]);
         for piece in pieces {
             let (x0, x1) = (piece.x0 - centre, piece.x1 - centre);
@@ -185,7 +191,8 @@ fn slices(pieces: &[Piece], centre: f64, sign: f64, source: u32) -> Vec<Slice> {
             } else if larger(piece.y0, piece.y1) >= band[1] - 2.0 * SAME_HEIGHT {
                 let run = (x1 - x0) / (piece.y1 - piece.y0);
                 let crossing = x0 + (low - piece.y0) * run;
-                // A rising piece lies above from the crossing to its end, a falling one from its start to the crossing.
+                // A rising piece lies above from the crossing to its end, a falling one from its start to the
+                // crossing.
                 let (side, end) = if piece.y1 > piece.y0 { (1.0, x1) } else { (-1.0, x0) };
                 length[0] += side * (end - crossing);
                 length[1] -= side * run;

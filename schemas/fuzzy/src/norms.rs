@@ -1,7 +1,7 @@
 //! The connectives: triangular norms (AND, activation), conorms (OR, accumulation) and hedges.
 //!
-//! Formulas: Klement, Mesiar & Pap 2000, chapter 1; IEC 61131-7:2000, table 4; the names in FCL follow the standard
-//! and, beyond it, the spelling that other readers of FCL share.
+//! Formulas: Klement, Mesiar & Pap 2000, chapter 1; IEC 61131-7:2000, table 4; the names in FCL follow the
+//! standard and, beyond it, the spelling that other readers of FCL share.
 
 /// The smaller of two numbers that are no NaN; one instruction, unlike `f64::min`.
 #[inline(always)]
@@ -43,9 +43,9 @@ pub enum SNorm {
     AlgebraicSum,
     /// `min(1, a + b)`, FCL `BSUM`.
     BoundedSum,
-    /// `a + b`, divided by its own maximum over the universe where that is above one, FCL `NSUM` (`SUM` is read too).
-    /// The division cancels in every defuzzification that divides by the area, so the engine accumulates the plain sum;
-    /// as OR, between two degrees, it is the bounded sum.
+    /// `a + b`, divided by its own maximum over the universe where that is above one, FCL `NSUM` (`SUM` is
+    /// read too). The division cancels in every defuzzification that divides by the area, so the engine
+    /// accumulates the plain sum; as OR, between two degrees, it is the bounded sum.
     NormalisedSum,
     /// `max(a, b)` where the other is 0, else 1, FCL `DSUM`.
     DrasticSum,
@@ -151,7 +151,8 @@ impl SNorm {
         }
     }
 
-    /// How conclusions add up at one place of an output's universe: as `apply`, but a normalised sum is not bounded.
+    /// How conclusions add up at one place of an output's universe: as `apply`, but a normalised sum is not
+    /// bounded.
     #[inline]
     pub(crate) fn accumulate(self, a: f64, b: f64) -> f64 {
         if self == Self::NormalisedSum { a + b } else { self.apply(a, b) }

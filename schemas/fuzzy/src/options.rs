@@ -9,16 +9,16 @@ use super::terms::TermError;
 pub struct Options {
     /// How areas are integrated.
     pub integration: Integration,
-    /// Inputs nearer to a term's corner than this count as the corner, and rules whose activation is not above it do not
-    /// fire. 0, the default, compares exactly; fuzzylite uses 1e-6.
+    /// Inputs nearer to a term's corner than this count as the corner, and rules whose activation is not
+    /// above it do not fire. 0, the default, compares exactly; fuzzylite uses 1e-6.
     pub comparison_tolerance: f64,
 }
 
 /// How the area under an accumulated conclusion is integrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Integration {
-    /// In closed form where terms are made of straight lines, by adaptive quadrature (to about 1e-10) where the centroid of
-    /// curves is asked for. (Bisector and maxima of curves: 1000 samples.)
+    /// In closed form where terms are made of straight lines, by adaptive quadrature (to about 1e-10) where
+    /// the centroid of curves is asked for. (Bisector and maxima of curves: 1000 samples.)
     #[default]
     Exact,
     /// Over this many samples, each in the middle of its step.
@@ -41,7 +41,8 @@ pub enum EngineError {
         /// What is wrong.
         source: TermError,
     },
-    /// An input with a term that is a Sugeno conclusion, or a linear conclusion with the wrong number of factors.
+    /// An input with a term that is a Sugeno conclusion, or a linear conclusion with the wrong number of
+    /// factors.
     #[error(
         "term {term} of {variable}: a linear function of the {inputs} inputs stands in an output and has {inputs} factors and a constant"
     )]

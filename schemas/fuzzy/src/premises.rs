@@ -1,5 +1,6 @@
-//! From input values to the activation of every rule, compiled: memberships lie in one flat array of slots, terms with
-//! straight flanks are computed side by side without a branch, and a rule that is a plain conjunction is a row of slots.
+//! From input values to the activation of every rule, compiled: memberships lie in one flat array of slots,
+//! terms with straight flanks are computed side by side without a branch, and a rule that is a plain
+//! conjunction is a row of slots.
 
 use super::norms::{Hedge, SNorm, TNorm, larger, smaller};
 use super::options::EngineError;
@@ -7,7 +8,8 @@ use super::system::{Condition, RuleBlock, System};
 use super::terms::Term;
 use std::ops::Range;
 
-/// The first slot is always 1, the neutral element of every AND: rows shorter than their group are filled with it.
+/// The first slot is always 1, the neutral element of every AND: rows shorter than their group are filled
+/// with it.
 const TRUE: u16 = 0;
 
 /// Beyond this an input counts as this: an infinite distance stays infinite enough, and no sum becomes NaN.
@@ -153,7 +155,8 @@ impl Premises {
         Some(self.slots[usize::from(slot)])
     }
 
-    /// Computes every rule's activation. False, and all activations zero, if a value is missing or not a number.
+    /// Computes every rule's activation. False, and all activations zero, if a value is missing or not a
+    /// number.
     pub(crate) fn evaluate(&mut self, values: &[f64], comparison_tolerance: f64) -> bool {
         if values.len() < self.inputs.len() || values.iter().any(|value| value.is_nan()) {
             self.slots[1..].fill(0.0);
@@ -280,7 +283,8 @@ impl Premises {
 }
 
 impl Flanks {
-    /// Terms made of at most one rising flank from 0 to 1 and then at most one falling flank back, neither upright.
+    /// Terms made of at most one rising flank from 0 to 1 and then at most one falling flank back, neither
+    /// upright.
     fn of(term: &Term) -> Option<Self> {
         let corners = term.corners()?;
         let (mut rise, mut fall) = (None, None);

@@ -1,9 +1,10 @@
-//! The centroid of curves: adaptive Gauss-Kronrod quadrature (7 and 15 points; Piessens et al. 1983, QUADPACK), divided at
-//! the places where a term bends, until the two rules agree to 1e-12 of the universe.
+//! The centroid of curves: adaptive Gauss-Kronrod quadrature (7 and 15 points; Piessens et al. 1983,
+//! QUADPACK), divided at the places where a term bends, until the two rules agree to 1e-12 of the universe.
 //!
-//! A kink between an interval's end and its outermost node would go unseen, so an interval with a kink (another term on top, or
-//! clipped at one end only) is halved until it is too short to matter. So the centroid is exact to about 1e-10 of the universe;
-//! only a term that surfaces and dives again between two nodes may be missed, which costs 1e-5 at the very worst.
+//! A kink between an interval's end and its outermost node would go unseen, so an interval with a kink
+//! (another term on top, or clipped at one end only) is halved until it is too short to matter. So the
+//! centroid is exact to about 1e-10 of the universe; only a term that surfaces and dives again between two
+//! nodes may be missed, which costs 1e-5 at the very worst.
 
 use super::norms::{SNorm, TNorm};
 use super::terms::Term;

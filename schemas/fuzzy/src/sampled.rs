@@ -1,5 +1,6 @@
-//! Defuzzification over samples of the universe, taken in the middle of equal steps: what most programs of the field do, for
-//! comparison with them, and for curves where speed counts more than the last digits. Memberships are tabulated once.
+//! Defuzzification over samples of the universe, taken in the middle of equal steps: what most programs of
+//! the field do, for comparison with them, and for curves where speed counts more than the last digits.
+//! Memberships are tabulated once.
 
 use super::norms::{SNorm, TNorm, larger, smaller};
 use super::system::Method;

@@ -1,7 +1,8 @@
 //! Membership functions: every shape that the field's tools share, as one plain enum.
 //!
-//! Formulas: Jang, Sun & Mizutani 1997, chapter 2, for triangle, trapezoid, Gaussian, bell and sigmoids; Zadeh's S and Z
-//! curves; spike, cosine, concave and ramp as fuzzylite defines them (its manual, "linguistic terms").
+//! Formulas: Jang, Sun & Mizutani 1997, chapter 2, for triangle, trapezoid, Gaussian, bell and sigmoids;
+//! Zadeh's S and Z curves; spike, cosine, concave and ramp as fuzzylite defines them (its manual, "linguistic
+//! terms").
 
 use std::f64::consts::PI;
 
@@ -87,7 +88,8 @@ impl Piece {
 }
 
 impl Term {
-    /// The degree of membership of `x`, in [0, 1]; NaN for NaN. A Sugeno conclusion of order one has none: NaN.
+    /// The degree of membership of `x`, in [0, 1]; NaN for NaN. A Sugeno conclusion of order one has none:
+    /// NaN.
     pub fn membership(&self, x: f64) -> f64 {
         if x.is_nan() {
             return f64::NAN;
@@ -190,8 +192,8 @@ impl Term {
         }
     }
 
-    /// The corners of a membership function made of straight lines; a jump is two corners at one place. Beyond the first
-    /// and the last the degree stays. `None` for curves and for values.
+    /// The corners of a membership function made of straight lines; a jump is two corners at one place.
+    /// Beyond the first and the last the degree stays. `None` for curves and for values.
     pub(crate) fn corners(&self) -> Option<Vec<(f64, f64)>> {
         let all = match *self {
             Self::Triangle([a, b, c]) => vec![(a, 0.0), (b, 1.0), (c, 0.0)],

@@ -152,7 +152,8 @@ impl Walk {
         })
     }
 
-    /// Calls `visit` for each straight part of the accumulated conclusion, from left to right; parts at zero are left out.
+    /// Calls `visit` for each straight part of the accumulated conclusion, from left to right; parts at zero
+    /// are left out.
     fn pieces(&mut self, degrees: &[f64], mut visit: impl FnMut(Piece)) {
         for cell in &self.cells {
             self.active.clear();

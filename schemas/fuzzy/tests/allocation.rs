@@ -18,7 +18,8 @@ unsafe impl GlobalAlloc for Counting {
         unsafe { System.alloc(layout) }
     }
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps the contract of `dealloc`, and the memory came from the system's allocator.
+        // SAFETY: the caller keeps the contract of `dealloc`, and the memory came from the system's
+        // allocator.
         unsafe { System.dealloc(pointer, layout) }
     }
 }

@@ -32,8 +32,9 @@ impl Prism {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BodyKind {
-    /// Two shelves joined by thick bars at the four corners, on castors. The lower shelf ends 20 mm below sensors at a height
-    /// of 0.25 m: a level beam passes between the bars (COF-122). 0.90 m along x, 0.50 m along y.
+    /// Two shelves joined by thick bars at the four corners, on castors. The lower shelf ends 20 mm below
+    /// sensors at a height of 0.25 m: a level beam passes between the bars (COF-122). 0.90 m along x, 0.50 m
+    /// along y.
     MailCart,
     /// One pole, a five-armed base below, a seat with a piece of fabric hanging underneath (COF-123).
     SpinningChair,
@@ -88,7 +89,8 @@ impl Body {
         }
     }
 
-    /// A box of that extent along x, y and z, in metres, standing on the floor; the size of other kinds is fixed.
+    /// A box of that extent along x, y and z, in metres, standing on the floor; the size of other kinds is
+    /// fixed.
     pub fn with_size(kind: BodyKind, [length_m, width_m, height_m]: [f64; 3]) -> Self {
         match kind {
             BodyKind::CardboardBox | BodyKind::WallBox => {
@@ -155,7 +157,8 @@ fn spinning_chair() -> Body {
         arms.clone().filter_map(|arm| turned_block(at(arm, 0.5 * reach_m), reach_m, 0.045, 0.06, 0.12));
     let wheels = arms.map(|arm| disc(at(arm, reach_m).x_m, at(arm, reach_m).y_m, 0.03, 0.0, 0.06));
     let pole = disc(0.0, 0.0, 0.025, 0.06, 0.42);
-    // Hangs down in front of the pole and to one side of it, low enough for the upper rays of a beam at 0.25 m.
+    // Hangs down in front of the pole and to one side of it, low enough for the upper rays of a beam at 0.25
+    // m.
     let fabric = block(0.10, -0.12, 0.02, 0.16, 0.27, 0.42);
     let seat = disc(0.0, 0.0, 0.24, 0.42, 0.50);
     let back = block(-0.23, 0.0, 0.05, 0.40, 0.50, 0.95);

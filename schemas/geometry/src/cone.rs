@@ -24,8 +24,8 @@ impl Cone {
         self.columns * self.rows
     }
 
-    /// Azimuth (counter-clockwise) and elevation (up) of a ray in radians, relative to the sensor's axis. Rays are numbered
-    /// row by row, from the lowest row, each from right to left.
+    /// Azimuth (counter-clockwise) and elevation (up) of a ray in radians, relative to the sensor's axis.
+    /// Rays are numbered row by row, from the lowest row, each from right to left.
     pub fn direction_rad(&self, ray: usize) -> (f64, f64) {
         let columns = self.columns.max(1);
         let (row, column) = (ray / columns, ray % columns);
@@ -39,8 +39,9 @@ fn spread(index: usize, count: usize, half_rad: f64) -> f64 {
 }
 
 impl Scene {
-    /// Casts every ray of a cone from `sensor` at a height above the floor. `hits` is emptied, and then holds one entry a
-    /// ray in the order of [`Cone::direction_rad`]: what the ray meets, or `None` within the cone's range.
+    /// Casts every ray of a cone from `sensor` at a height above the floor. `hits` is emptied, and then holds
+    /// one entry a ray in the order of [`Cone::direction_rad`]: what the ray meets, or `None` within the
+    /// cone's range.
     pub fn cast_cone(&self, sensor: Pose2, height_m: f64, cone: &Cone, hits: &mut Vec<Option<Hit>>) {
         hits.clear();
         hits.resize(cone.rays(), None);

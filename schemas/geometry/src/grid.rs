@@ -242,7 +242,7 @@ impl<T> Grid<T> {
         self.frame.cell_at(point).and_then(|cell| self.get(cell))
     }
 
-    /// The same grid with other values.
+    /// This grid with other values.
     pub fn map<U>(&self, change: impl FnMut(&T) -> U) -> Grid<U> {
         Grid { frame: self.frame, cells: self.cells.iter().map(change).collect() }
     }

@@ -15,7 +15,8 @@ pub struct Hull {
 }
 
 impl Hull {
-    /// From the turning centre to the farthest corner, in metres: in a turn on the spot the hull needs a circle of this radius.
+    /// From the turning centre to the farthest corner, in metres: in a turn on the spot the hull needs a
+    /// circle of this radius.
     pub fn radius_m(&self) -> f64 {
         self.front_m.max(self.rear_m).hypot(self.side_m)
     }
@@ -28,7 +29,8 @@ impl Hull {
         if ahead_m == 0.0 { aside_m } else { ahead_m.hypot(aside_m) }
     }
 
-    /// From the hull of a robot at `pose` to a point of the frame that `pose` is given in, in metres; 0 inside.
+    /// From the hull of a robot at `pose` to a point of the frame that `pose` is given in, in metres; 0
+    /// inside.
     pub fn distance_m(&self, pose: Pose2, point: Point2<f64>) -> f64 {
         self.distance_to_m(pose.inverse_transform(point))
     }
@@ -38,7 +40,8 @@ impl Hull {
         point.x > -self.rear_m && point.x < self.front_m && point.y.abs() < self.side_m
     }
 
-    /// The speed of the hull's fastest corner, in m/s, at a speed ahead and a turning speed (counter-clockwise, rad/s).
+    /// The speed of the hull's fastest corner, in m/s, at a speed ahead and a turning speed
+    /// (counter-clockwise, rad/s).
     pub fn fastest_corner_mps(&self, forward_mps: f64, turn_rad_per_s: f64) -> f64 {
         let along_mps = forward_mps.abs() + turn_rad_per_s.abs() * self.side_m;
         along_mps.hypot(turn_rad_per_s * self.front_m.max(self.rear_m))

@@ -39,8 +39,8 @@ pub enum MapMode {
     /// an image that has one is averaged into the brightness as a fourth colour.
     #[default]
     Trinary,
-    /// The same outside of the thresholds; between them the probability rises in proportion. A pixel that is
-    /// not fully opaque is unknown.
+    /// As `Trinary` outside of the thresholds; between them the probability rises in proportion. A pixel that
+    /// is not fully opaque is unknown.
     Scale,
     /// The pixel's brightness, 0 to 255, is the per cent; what is above 100 is unknown. Neither `negate` nor
     /// opacity counts.

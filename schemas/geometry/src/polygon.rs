@@ -129,8 +129,8 @@ impl Polygon {
         anchor + sum / (3.0 * twice_area)
     }
 
-    /// Whether `point` lies inside. Left and lower edges belong to the polygon, right and upper ones do not, so that polygons
-    /// which tile the plane share no point.
+    /// Whether `point` lies inside. Left and lower edges belong to the polygon, right and upper ones do not,
+    /// so that polygons which tile the plane share no point.
     pub fn contains(&self, point: Point2<f64>) -> bool {
         let mut inside = false;
         for edge in self.edges() {
@@ -144,8 +144,8 @@ impl Polygon {
         inside
     }
 
-    /// A random place inside, at least `clearance_m` from the boundary, by numbers of the caller's that are uniform in [0, 1); `None` where
-    /// there is none, or next to none.
+    /// A random place inside, at least `clearance_m` from the boundary, by numbers of the caller's that are
+    /// uniform in [0, 1); `None` where there is none, or next to none.
     pub fn random_place(&self, clearance_m: f64, mut uniform: impl FnMut() -> f64) -> Option<Point2<f64>> {
         const TRIES: usize = 10_000;
         let (low, high) = self.bounds();
@@ -209,7 +209,8 @@ impl Polygon {
     }
 }
 
-/// Whether the closed line through `corners` touches itself nowhere but at common corners of neighbouring edges.
+/// Whether the closed line through `corners` touches itself nowhere but at common corners of neighbouring
+/// edges.
 pub fn is_simple(corners: &[Point2<f64>]) -> bool {
     corners.len() >= 3 && first_touching_edges(corners).is_none()
 }

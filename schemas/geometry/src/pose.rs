@@ -3,7 +3,8 @@
 use crate::angle;
 use nalgebra::{Point2, Vector2};
 
-/// A place and a direction in a plane frame: metres and radians, x forward, y left, heading counter-clockwise from x.
+/// A place and a direction in a plane frame: metres and radians, x forward, y left, heading counter-clockwise
+/// from x.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pose2 {
@@ -72,8 +73,9 @@ impl Pose2 {
         self.frame().inverse_transform(point)
     }
 
-    /// Where a differential drive stands after an arc of `distance_m` along its path while its heading changes by `turn_rad`
-    /// (the exact motion at constant wheel speeds; Siegwart and Nourbakhsh 2011, section 5.2.4, without their small-angle step).
+    /// Where a differential drive stands after an arc of `distance_m` along its path while its heading
+    /// changes by `turn_rad` (the exact motion at constant wheel speeds; Siegwart and Nourbakhsh 2011,
+    /// section 5.2.4, without their small-angle step).
     pub fn after_arc(self, distance_m: f64, turn_rad: f64) -> Self {
         // The chord of an arc is its length times sinc(turn / 2).
         let half = 0.5 * turn_rad;

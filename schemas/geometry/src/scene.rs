@@ -1,5 +1,5 @@
-//! A scene: walls from floor to ceiling, and bodies that may move. Rays and cones are cast into it, and the room around a
-//! footprint is measured in it.
+//! A scene: walls from floor to ceiling, and bodies that may move. Rays and cones are cast into it, and the
+//! room around a footprint is measured in it.
 
 use crate::{Body, Polygon, Pose2, Prism, Segment, Shape, Walls};
 use nalgebra::{Point2, Vector2};
@@ -146,7 +146,8 @@ impl Scene {
         self.cast_among(ray, reach, self.bodies.iter().filter(|placed| placed.is_present))
     }
 
-    /// [`Scene::cast_ray`] for a ray that no body `without` hinders, such as one that leaves a sensor on that very body.
+    /// [`Scene::cast_ray`] for a ray that no body `without` hinders, such as one that leaves a sensor on that
+    /// very body.
     pub fn cast_ray_without(&self, ray: &Ray, max_range_m: f64, without: BodyId) -> Option<Hit> {
         let reach = self.reach(ray, max_range_m);
         self.cast_among(ray, reach, self.present_without(Some(without)))
@@ -222,7 +223,7 @@ pub(crate) struct Met {
 }
 
 impl Reach {
-    /// The same for a ray that ends at `limit_m`, seen from above.
+    /// What a ray that ends at `limit_m` reaches, seen from above.
     pub(crate) fn shortened(self, limit_m: f64) -> Self {
         Self { limit_m, met: self.met.filter(|met| met.along_m < limit_m) }
     }
@@ -260,7 +261,8 @@ impl Reach {
             }
             Shape::Polygon(polygon) => {
                 for edge in polygon.edges() {
-                    // The inside lies to the left: an outer face is one that the ray crosses from right to left.
+                    // The inside lies to the left: an outer face is one that the ray crosses from right to
+                    // left.
                     let along = edge.vector();
                     let turn = along.x * ray.direction.y - along.y * ray.direction.x;
                     if turn <= 0.0 {
@@ -302,9 +304,9 @@ pub struct Clearance {
 }
 
 impl Scene {
-    /// Distance from a robot's footprint to the nearest wall, or part of a body that reaches into the heights between
-    /// `low_m` and `high_m`, in metres: 0 when they touch or overlap, infinite in an empty scene. `without` is the robot's own
-    /// body, if it is in the scene.
+    /// Distance from a robot's footprint to the nearest wall, or part of a body that reaches into the heights
+    /// between `low_m` and `high_m`, in metres: 0 when they touch or overlap, infinite in an empty scene.
+    /// `without` is the robot's own body, if it is in the scene.
     pub fn clearance_m(
         &self,
         footprint: &Polygon,

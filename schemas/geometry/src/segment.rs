@@ -110,8 +110,8 @@ impl Segment {
             || (is_zero(d_side) && within(other, self.b))
     }
 
-    /// The point that two pieces share. Of pieces that overlap along a line, the shared point closest to this piece's `a`;
-    /// `None` when they do not meet.
+    /// The point that two pieces share. Of pieces that overlap along a line, the shared point closest to this
+    /// piece's `a`; `None` when they do not meet.
     pub fn intersection(&self, other: &Self) -> Option<Point2<f64>> {
         if !self.intersects(other) {
             return None;
@@ -128,8 +128,8 @@ impl Segment {
         Some(self.at((cross(other.a - self.a, across) / turn).clamp(0.0, 1.0)))
     }
 
-    /// How far a ray from `origin` along the unit vector `direction` runs until it meets the piece, in metres; `None` when it
-    /// misses. A ray within the piece's own line meets it at its nearer end.
+    /// How far a ray from `origin` along the unit vector `direction` runs until it meets the piece, in
+    /// metres; `None` when it misses. A ray within the piece's own line meets it at its nearer end.
     pub fn cast_m(&self, origin: Point2<f64>, direction: Vector2<f64>) -> Option<f64> {
         let (along, to_a) = (self.vector(), self.a - origin);
         let turn = cross(direction, along);
@@ -161,7 +161,7 @@ fn opposite(a: f64, b: f64) -> bool {
     (a < 0.0 && b > 0.0) || (a > 0.0 && b < 0.0)
 }
 
-/// An orientation that is exactly none: the points lie on one line, as far as the numbers can tell.
+/// Whether an orientation is exactly zero: the points lie on one line, as far as the numbers can tell.
 fn is_zero(value: f64) -> bool {
     value == 0.0
 }

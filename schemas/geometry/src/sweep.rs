@@ -1,4 +1,5 @@
-//! How far a footprint can be pushed straight on until it touches something: parry's shape casting behind our own types.
+//! How far a footprint can be pushed straight on until it touches something: parry's shape casting behind our
+//! own types.
 
 use crate::{BodyId, Polygon, Pose2, Scene, Segment, Shape};
 use nalgebra::Point2;
@@ -7,10 +8,11 @@ use parry2d_f64::query::{ShapeCastOptions, cast_shapes};
 use parry2d_f64::shape;
 
 impl Scene {
-    /// How far a robot's footprint moves from `pose` along `heading_rad` (in the scene's frame, without turning) until it
-    /// touches a wall, or a part of a body that reaches into the heights between `low_m` and `high_m`, in metres: 0 when
-    /// it touches at once, `max_m` when it meets nothing before. A pose or heading that is not finite goes nowhere. Good to a
-    /// micrometre. `without` is the robot's own body, if it is in the scene.
+    /// How far a robot's footprint moves from `pose` along `heading_rad` (in the scene's frame, without
+    /// turning) until it touches a wall, or a part of a body that reaches into the heights between `low_m`
+    /// and `high_m`, in metres: 0 when it touches at once, `max_m` when it meets nothing before. A pose or
+    /// heading that is not finite goes nowhere. Good to a micrometre. `without` is the robot's own body, if
+    /// it is in the scene.
     pub fn free_way_m(
         &self,
         footprint: &Polygon,
@@ -58,8 +60,8 @@ impl Scene {
     }
 }
 
-/// The boundary as a closed line. Bodies that begin apart touch at their boundaries first, so that it does not matter
-/// whether the polygon is convex.
+/// The boundary as a closed line. Bodies that begin apart touch at their boundaries first, so that it does
+/// not matter whether the polygon is convex.
 fn outline(polygon: &Polygon) -> shape::Polyline {
     let corners: Vec<Vector> = polygon.corners().iter().map(|&corner| vector(corner)).collect();
     let count = corners.len() as u32;

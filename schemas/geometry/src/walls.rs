@@ -3,15 +3,16 @@
 use crate::Segment;
 use nalgebra::{Point2, Vector2};
 
-/// Up to so many walls are simply tried one after the other.
+/// Up to this many walls are simply tried one after the other.
 const FEW: usize = 12;
 /// Cells for each wall: what was fastest on hallways and arenas of 20 to 500 walls.
 const CELLS_PER_WALL: f64 = 6.0;
 /// No more cells than this along either side.
 const MOST_CELLS: f64 = 512.0;
-/// By how much of its own length a wall is longer for rays, so that none slips through between two walls that share a corner.
+/// By how much of its own length a wall is longer for rays, so that none slips through between two walls that
+/// share a corner.
 const LONGER: f64 = 1e-7;
-/// Rays closer to a wall's own line than this (length times sine) pass it: its thickness is none.
+/// Rays closer to a wall's own line than this (length times sine) pass it: it has no thickness.
 const PARALLEL: f64 = 1e-12;
 
 /// A wall where a ray met it.
@@ -92,14 +93,14 @@ impl Walls {
         &self.segments
     }
 
-    /// The nearest wall that a ray meets within `max_range_m`; `None` when there is none, or when a number is not finite.
-    /// A ray within a wall's own line passes it.
+    /// The nearest wall that a ray meets within `max_range_m`; `None` when there is none, or when a number is
+    /// not finite. A ray within a wall's own line passes it.
     pub fn cast(&self, origin: Point2<f64>, heading_rad: f64, max_range_m: f64) -> Option<WallHit> {
         let (sine, cosine) = heading_rad.sin_cos();
         self.cast_along(origin, Vector2::new(cosine, sine), max_range_m)
     }
 
-    /// The same along a unit vector.
+    /// The nearest wall that a ray along a unit vector meets, as [`Walls::cast`] says.
     pub fn cast_along(
         &self,
         origin: Point2<f64>,
@@ -117,7 +118,8 @@ impl Walls {
         Some(WallHit { range_m: nearest.range_m, incidence_cos, wall: edge.wall as usize })
     }
 
-    /// Whether the straight way between two points meets no wall. Ends that lie on a wall count as meeting it.
+    /// Whether the straight way between two points meets no wall. Ends that lie on a wall count as meeting
+    /// it.
     pub fn is_free(&self, from: Point2<f64>, to: Point2<f64>) -> bool {
         let step = to - from;
         let length_m = step.norm();
@@ -130,7 +132,8 @@ impl Walls {
         self.segments.iter().map(|wall| wall.distance_m(point)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Cell by cell along the ray (Amanatides and Woo 1987), until the nearest wall so far lies before the next cell.
+    /// Cell by cell along the ray (Amanatides and Woo 1987), until the nearest wall so far lies before the
+    /// next cell.
     fn walk(&self, origin: Point2<f64>, direction: Vector2<f64>, nearest: &mut Nearest) {
         let size = Vector2::new(self.columns as f64, self.rows as f64) * self.cell_m;
         let mut enter_m: f64 = 0.0;

@@ -284,7 +284,8 @@ impl World {
         DoorGeometry::cut(self.floor(door.floor)?, &door.opening())
     }
 
-    /// The same for the elevator's door on one floor; its room is the car.
+    /// The exact lines of the elevator's door on one floor; its room is the car. `None` where it does not
+    /// stop.
     pub fn elevator_geometry(&self, elevator: &Elevator, floor: i32) -> Option<DoorGeometry> {
         let stops = elevator.floors.contains(&floor);
         if stops { DoorGeometry::cut(self.floor(floor)?, &elevator.opening()) } else { None }

@@ -22,7 +22,8 @@ crate::state! {
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]
 pub struct Order {
-    /// The customer's number for it; repeated orders with one number count once. Zero lets the navigator number it.
+    /// The customer's number for it; repeated orders with one number count once. Zero lets the navigator
+    /// number it.
     pub order_id: u64,
     /// Where to.
     pub room: RoomName,
@@ -70,11 +71,13 @@ crate::state! {
     }
 }
 
-/// What became of an order. Published by `navigator` on `mission/reports`, one message for each order and change; every one counts.
+/// What became of an order. Published by `navigator` on `mission/reports`, one message for each order and
+/// change; every one counts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]
 pub struct OrderReport {
-    /// The order's number: the customer's, or the navigator's where the customer gave none; zero for one that was refused without a number.
+    /// The order's number: the customer's, or the navigator's where the customer gave none; zero for one that
+    /// was refused without a number.
     pub order_id: u64,
     /// The room that was named.
     pub room: RoomName,
@@ -112,7 +115,8 @@ pub struct MissionStatus {
     pub remark: FixedText<64>,
 }
 
-/// The angle between the robot and the hallway. Published by `angle-correction` on `heading/correction` (COF-080..093).
+/// The angle between the robot and the hallway. Published by `angle-correction` on `heading/correction`
+/// (COF-080..093).
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]
 pub struct HeadingCorrection {

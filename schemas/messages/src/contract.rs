@@ -63,8 +63,8 @@ impl Topic {
         self.publisher.as_deref().or_else(|| health_of(&self.name))
     }
 
-    /// Whether a service shows on it that it lives. What is said there depends on the machine, and is no part of
-    /// what a run came to.
+    /// Whether a service shows on it that it lives. What is said there depends on the machine, and is no part
+    /// of what a run came to.
     pub fn is_health(&self) -> bool {
         is_health(&self.name)
     }

@@ -47,8 +47,8 @@ crate::state! {
         ShuttingDown = 8,
         /// The guard stops for something in front only, and the command leads slowly backwards, away from it.
         Escaping = 9,
-        /// The command leads into something that the guard knows of, backwards over ground that was not driven, or beyond what was
-        /// ordered.
+        /// The command leads into something that the guard knows of, backwards over ground that was not
+        /// driven, or beyond what was ordered.
         NoRoom = 10,
         /// The guard's word names no radius in which the robot could stop.
         NothingGuarded = 11,
@@ -59,9 +59,11 @@ crate::state! {
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]
 pub struct AppliedWheels {
-    /// Speed of the left wheel's rim, forward positive; zero whenever the reason is neither `Driving` nor `Escaping`.
+    /// Speed of the left wheel's rim, forward positive; zero whenever the reason is neither `Driving` nor
+    /// `Escaping`.
     pub left_mps: f64,
-    /// Speed of the right wheel's rim, forward positive; zero whenever the reason is neither `Driving` nor `Escaping`.
+    /// Speed of the right wheel's rim, forward positive; zero whenever the reason is neither `Driving` nor
+    /// `Escaping`.
     pub right_mps: f64,
     /// How often since its start the driver stopped the wheels because a GO or a command was late.
     pub deadline_misses: u64,

@@ -31,7 +31,8 @@ crate::state! {
     }
 }
 
-/// Where the car is. Published by the elevator's interface, in simulation by `simulator`, on `elevator/state`.
+/// Where the car is. Published by the elevator's interface, in simulation by `simulator`, on
+/// `elevator/state`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]
 pub struct ElevatorState {

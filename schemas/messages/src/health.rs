@@ -17,7 +17,8 @@ crate::state! {
     }
 }
 
-/// How a service fares since the last message of this kind. Published by every service's node on `health/<service>`.
+/// How a service fares since the last message of this kind. Published by every service's node on
+/// `health/<service>`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]
 pub struct Health {

@@ -37,7 +37,8 @@ impl Kind {
 }
 
 impl Description {
-    /// The message in these bytes as JSON, field by field. Bytes that are missing show as null; NaN and infinities as texts.
+    /// The message in these bytes as JSON, field by field. Bytes that are missing show as null; NaN and
+    /// infinities as texts.
     pub fn to_json(&self, bytes: &[u8]) -> Value {
         let mut object = record_to_json(self, bytes);
         if let (Some(element), Value::Object(fields)) = (&self.element, &mut object) {

@@ -1,4 +1,5 @@
-//! What a message says about itself at run time: names, types, offsets, units, docs, and the fingerprint of the layout.
+//! What a message says about itself at run time: names, types, offsets, units, docs, and the fingerprint of
+//! the layout.
 
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
@@ -153,7 +154,8 @@ pub struct Description {
 }
 
 impl Description {
-    /// A hash over names, types and offsets (FNV-1a, 64 bits): equal for equal layouts and meanings, whatever the docs say.
+    /// A hash over names, types and offsets (FNV-1a, 64 bits): equal for equal layouts and meanings, whatever
+    /// the docs say.
     pub fn fingerprint(&self) -> u64 {
         let mut layout = String::new();
         self.write_layout(&mut layout);

@@ -116,8 +116,8 @@ pub struct Particle {
     pub weight: f32,
 }
 
-/// What a particle localiser believes, for viewing: the header, then a selection of its particles. Published by `particle-localiser`, at
-/// most every so often, on `location/particles`.
+/// What a particle localiser believes, for viewing: the header, then a selection of its particles. Published
+/// by `particle-localiser`, at most every so often, on `location/particles`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[message(element = Particle)]
 #[repr(C)]
@@ -134,7 +134,8 @@ pub struct ParticleCloud {
     pub clusters: [PoseCluster; CLUSTER_CAPACITY],
     /// Particles of the localiser, of which the elements are a selection.
     pub count: u32,
-    /// Particles that the belief needs; more than `count` where the bound of the update or the parameters lowered it.
+    /// Particles that the belief needs; more than `count` where the bound of the update or the parameters
+    /// lowered it.
     pub wanted_count: u32,
     /// Valid entries of `clusters`.
     pub cluster_count: u32,

@@ -4,8 +4,8 @@ use crate::Message;
 use geometry::{GridFrame, Occupancy, OccupancyGrid, Pose2};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// A grid of what is occupied: the header, then the probability of each cell in per cent, row after row, 255 where nothing is known.
-/// Published by `mapper` on `map/occupancy`.
+/// A grid of what is occupied: the header, then the probability of each cell in per cent, row after row, 255
+/// where nothing is known. Published by `mapper` on `map/occupancy`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[message(element = u8)]
 #[repr(C)]
@@ -36,7 +36,8 @@ impl OccupancyMap {
     /// A cell of which nothing is known.
     pub const UNKNOWN: u8 = 255;
 
-    /// What is known of a cell; whatever the header claims, what is not there or no per cent is unknown.
+    /// What is known of a cell. A cell that is not there, whatever the header claims, and a value that is no
+    /// per cent are unknown.
     pub fn cell(&self, elements: &[u8], column: u32, row: u32) -> Occupancy {
         let index = u64::from(row) * u64::from(self.columns) + u64::from(column);
         let cell = usize::try_from(index).ok().and_then(|index| elements.get(index));
@@ -44,7 +45,7 @@ impl OccupancyMap {
         cell.filter(|_| inside).and_then(|&percent| Occupancy::from_percent(percent)).unwrap_or_default()
     }
 
-    /// The map as a grid; `None` when its header makes none, or does not fit its elements.
+    /// The map as a grid; `None` when its header is invalid, or does not fit its elements.
     pub fn grid(&self, elements: &[u8]) -> Option<OccupancyGrid> {
         let origin =
             Pose2 { x_m: self.origin_x_m, y_m: self.origin_y_m, heading_rad: self.origin_heading_rad };

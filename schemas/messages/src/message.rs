@@ -3,7 +3,8 @@
 use crate::{Description, Field, Time};
 use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 
-/// The fixed part of a message and, in `Element`, the type of what may follow it. Derived, never written by hand.
+/// The fixed part of a message and, in `Element`, the type of what may follow it. Derived, never written by
+/// hand.
 pub trait Message:
     Field + FromBytes + IntoBytes + Immutable + KnownLayout + Copy + std::fmt::Debug + 'static
 {
@@ -125,7 +126,7 @@ impl<'a, T: Message> Stamped<'a, T> {
         Self { stamp, origin: stamp, sequence: 0, message, elements: &[] }
     }
 
-    /// The same with elements.
+    /// A message with elements, published and measured at `stamp`.
     pub fn with_elements(stamp: Time, message: &'a T, elements: &'a [T::Element]) -> Self {
         Self { stamp, origin: stamp, sequence: 0, message, elements }
     }
@@ -135,8 +136,8 @@ impl<'a, T: Message> Stamped<'a, T> {
         MessageId { stamp: self.stamp, sequence: self.sequence }
     }
 
-    /// The message if it was published no longer than `max_age` ago, and not farther ahead than that either: a stamp from the far future
-    /// would stay fresh for ever.
+    /// The message if it was published no longer than `max_age` ago, and not farther ahead than that either:
+    /// a stamp from the far future would stay fresh for ever.
     pub fn fresh(self, now: Time, max_age: std::time::Duration) -> Option<Self> {
         (now.since(self.stamp) <= max_age && self.stamp.since(now) <= max_age).then_some(self)
     }
@@ -158,8 +159,8 @@ pub struct MessageId {
     pub sequence: u64,
 }
 
-/// Lets each message through once. A step is given the newest message of a topic whenever anything is new, so it
-/// sees one message many times.
+/// Lets each message through once. A step is given the newest message of a topic whenever anything is new, so
+/// it sees one message many times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Once {
     last: Option<MessageId>,
@@ -186,8 +187,8 @@ impl Once {
 
 /// Declares a state: a transparent 32-bit integer with named values and a checked reading.
 ///
-/// `state! { /// What it says. Signal, Verdict { /// Halt. Stop = 0, /// Drive. Go = 1 } }` declares the field type `Signal` and the
-/// enum `Verdict`; `Signal::from(Verdict::Go)`, `signal.get()?`.
+/// `state! { /// What it says. Signal, Verdict { /// Halt. Stop = 0, /// Drive. Go = 1 } }` declares the
+/// field type `Signal` and the enum `Verdict`; `Signal::from(Verdict::Go)`, `signal.get()?`.
 #[macro_export]
 macro_rules! state {
     ($(#[$doc:meta])* $field:ident, $names:ident { $($(#[$variant_doc:meta])* $variant:ident = $value:literal),+ $(,)? }) => {

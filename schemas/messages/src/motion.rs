@@ -15,7 +15,8 @@ crate::state! {
     }
 }
 
-/// One motion. Published by `executive` on `motion/command`; a new number is a new motion, and ends the last one.
+/// One motion. Published by `executive` on `motion/command`; a new number is a new motion, and ends the last
+/// one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]
 pub struct MotionCommand {
@@ -25,7 +26,8 @@ pub struct MotionCommand {
     pub distance_m: f64,
     /// How far to turn, counter-clockwise; more than π is the long way.
     pub turn_rad: f64,
-    /// So much is free behind the robot where the motion begins: no farther may it drive back when it comes too near to a wall.
+    /// So much is free behind the robot where the motion begins: no farther may it drive back when it comes
+    /// too near to a wall.
     pub retreat_m: f64,
     /// What to do.
     pub kind: MotionKind,

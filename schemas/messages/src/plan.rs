@@ -47,7 +47,8 @@ pub struct Waypoint {
     pub y_m: f64,
 }
 
-/// The planner's answer: the header, then the waypoints from the robot to the goal. Published by the planner on `plan/path`.
+/// The planner's answer: the header, then the waypoints from the robot to the goal. Published by the planner
+/// on `plan/path`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[message(element = Waypoint)]
 #[repr(C)]

@@ -40,8 +40,8 @@ crate::state! {
 
 /// The eight time-of-flight sensors. Published by `tof-driver` on `tof/ranges`.
 ///
-/// Numbered as an arc from the farthest back right (0) to the farthest back left (7): 0, 1 right; 2 to 5 front, right to left; 6, 7 left
-/// (COF-024, COF-025).
+/// Numbered as an arc from the farthest back right (0) to the farthest back left (7): 0, 1 right; 2 to 5
+/// front, right to left; 6, 7 left (COF-024, COF-025).
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]
 pub struct TofRanges {
@@ -75,8 +75,9 @@ impl TofRanges {
     /// Distance between the two sensors of a side (COF-023).
     pub const SIDE_BASE_M: f64 = 0.277;
 
-    /// Where each sensor sits and looks in the robot's frame, whose origin is the middle of the 610 mm long and 510 mm wide body
-    /// (COF-003, COF-023, COF-025): the front sensors 115 mm apart on the front edge, the side sensors 277 mm apart on the side edges.
+    /// Where each sensor sits and looks in the robot's frame, whose origin is the middle of the 610 mm long
+    /// and 510 mm wide body (COF-003, COF-023, COF-025): the front sensors 115 mm apart on the front edge,
+    /// the side sensors 277 mm apart on the side edges.
     pub const MOUNTS: [Pose2; TOF_COUNT] = [
         mount(-0.1385, -0.255, -FRAC_PI_2),
         mount(0.1385, -0.255, -FRAC_PI_2),
@@ -88,7 +89,8 @@ impl TofRanges {
         mount(-0.1385, 0.255, FRAC_PI_2),
     ];
 
-    /// The reading of one sensor. Sensors that do not exist, states without a name and numbers that are no distance are faults.
+    /// The reading of one sensor. Sensors that do not exist, states without a name and numbers that are no
+    /// distance are faults.
     pub fn reading(&self, sensor: usize) -> Reading {
         let (Some(&range_m), Some(status)) = (self.range_m.get(sensor), self.status.get(sensor)) else {
             return Reading::Fault;
@@ -115,12 +117,12 @@ impl TofRanges {
     }
 }
 
-/// A scan of a laser or of a turning sensor: the header, then one range per beam. Published on `laser/scan`, by `ultrasonic-driver` on
-/// `sonar/raw`, and by `scan-conditioner` on `sonar/scan`.
+/// A scan of a laser or of a turning sensor: the header, then one range per beam. Published on `laser/scan`,
+/// by `ultrasonic-driver` on `sonar/raw`, and by `scan-conditioner` on `sonar/scan`.
 ///
-/// Beam `i` looks along `sensor_heading_rad + angle_min_rad + i * angle_step_rad` in the robot's frame. Ranges from `range_max_m` on,
-/// and +inf, say that nothing was seen; -inf says that something is too near to be measured (ROS REP 117); zero, negative numbers and
-/// NaN are no readings.
+/// Beam `i` looks along `sensor_heading_rad + angle_min_rad + i * angle_step_rad` in the robot's frame.
+/// Ranges from `range_max_m` on, and +inf, say that nothing was seen; -inf says that something is too near to
+/// be measured (ROS REP 117); zero, negative numbers and NaN are no readings.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[message(element = f32)]
 #[repr(C)]

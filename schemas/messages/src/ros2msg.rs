@@ -1,8 +1,10 @@
-//! A message's description as a ROS 2 message definition, so that the tools of that world read our recordings.
+//! A message's description as a ROS 2 message definition, so that the tools of that world read our
+//! recordings.
 //!
-//! The text follows <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>, several definitions in one as MCAP's `ros2msg`
-//! encoding wants it (<https://mcap.dev/spec/registry#ros2msg>). A state becomes a `uint32` with its names as constants before it, a text
-//! `uint8[N]`, a nested record a definition of its own, and the elements behind the fixed part a sequence called `elements`.
+//! The text follows <https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html>, several
+//! definitions in one as MCAP's `ros2msg` encoding wants it (<https://mcap.dev/spec/registry#ros2msg>). A
+//! state becomes a `uint32` with its names as constants before it, a text `uint8[N]`, a nested record a
+//! definition of its own, and the elements behind the fixed part a sequence called `elements`.
 
 use crate::{Description, FieldDescription, Kind};
 use std::collections::{BTreeSet, VecDeque};

@@ -56,8 +56,9 @@ pub struct NearPoint {
     pub y_m: f32,
 }
 
-/// May the robot move, and what is near it? Published by `collision-avoidance` and `proximity-guard` on `safety/clearance` for every
-/// sensor frame (COF-044, COF-066, COF-067): the header, then what the guard knows to be near the hull.
+/// May the robot move, and what is near it? Published by `collision-avoidance` and `proximity-guard` on
+/// `safety/clearance` for every sensor frame (COF-044, COF-066, COF-067): the header, then what the guard
+/// knows to be near the hull.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[message(element = NearPoint)]
 #[repr(C)]
@@ -84,16 +85,19 @@ pub struct Clearance {
     pub max_age_ms: u32,
     /// How often the signal has changed since the guard started.
     pub changes: u64,
-    /// Where the robot was, in the frame of odometry, when the points were written down; NaN when nobody knew.
+    /// Where the robot was along x, in the frame of odometry, when the points were written down; NaN when
+    /// unknown.
     pub at_x_m: f64,
-    /// The same, across.
+    /// Where the robot was along y, in the frame of odometry, when the points were written down; NaN when
+    /// unknown.
     pub at_y_m: f64,
-    /// The robot's heading there; NaN when nobody knew.
+    /// The robot's heading, in the frame of odometry, when the points were written down; NaN when unknown.
     pub at_heading_rad: f64,
 }
 
 impl Clearance {
-    /// Where the robot was, in the frame of odometry, when the points were written down; `None` when nobody knew.
+    /// Where the robot was, in the frame of odometry, when the points were written down; `None` when nobody
+    /// knew.
     pub fn at(&self) -> Option<Pose2> {
         let at = Pose2 { x_m: self.at_x_m, y_m: self.at_y_m, heading_rad: self.at_heading_rad };
         at.is_finite().then(|| Pose2::new(at.x_m, at.y_m, at.heading_rad))

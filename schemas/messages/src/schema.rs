@@ -1,8 +1,8 @@
 //! Values against the JSON schema of those who take them.
 //!
-//! A parameter's type, range and length stand in one place: at its field in the service's `Params`, from which
-//! the schema is derived. The launcher checks a graph against it before anything starts, and a service checks
-//! what it was given: by this code, in the same words.
+//! A parameter's type, range and length stand in one place: at its field in the service's `Params`, from
+//! which the schema is derived. The launcher checks a graph against it before anything starts, and a service
+//! checks what it was given: by this code, in the same words.
 
 use crate::unit_of;
 use serde_json::{Map, Value};

@@ -1,13 +1,13 @@
-//! Where range readings ended a moment ago, as points of the odometry frame: what lies in the gaps between the sensors was seen when the
-//! robot came there.
+//! Where range readings ended a moment ago, as points of the odometry frame: what lies in the gaps between
+//! the sensors was seen when the robot came there.
 
 use crate::{TOF_COUNT, Time, TofRanges, range::Reading};
 use geometry::{Hull, Point2, Pose2};
 
 /// Readings up to here are remembered.
 pub const SEEN_WITHIN_M: f64 = 0.8;
-/// Half of a time-of-flight sensor's field of view as a slope (COF-021), and the share of it in which a reading that passes is trusted to
-/// see everything.
+/// Half of a time-of-flight sensor's field of view as a slope (COF-021), and the share of it in which a
+/// reading that passes is trusted to see everything.
 const HALF_CONE: f64 = 0.13;
 const SURE_SHARE: f64 = 0.6;
 /// The points at a reading's ends, which lie on the edge of that share, are within it.
@@ -19,7 +19,7 @@ const ONE_POINT_M: f64 = 0.03;
 /// Sightings count up to here, in readings that pass: thin things are not always seen (COF-123).
 const SIGHTING: u8 = 3;
 const WEIGHT_MAX: u8 = 12;
-/// What was not seen for so long, or lies so far away, is forgotten.
+/// What was not seen for this long, or lies this far away, is forgotten.
 const KEPT_S: f64 = 20.0;
 const KEPT_WITHIN_M: f64 = 1.5;
 /// So many points are remembered at most; the oldest makes room for another.
@@ -68,7 +68,8 @@ impl Sightings {
         self.points.clear();
     }
 
-    /// Forgets what is old, far away, or not farther from the robot's hull than `beyond_m`: where the robot stands, nothing else does.
+    /// Forgets what is old, far away, or not farther from the robot's hull than `beyond_m`: where the robot
+    /// stands, nothing else does.
     pub fn forget(&mut self, now: Time, here: Pose2, hull: &Hull, beyond_m: f64) {
         let frame = here.frame();
         self.points.retain(|point| {
@@ -78,8 +79,9 @@ impl Sightings {
         });
     }
 
-    /// Takes in that a reading of `range_m` along the x axis of `eye` passes through what lies before its end. `slope` is how wide the
-    /// view is that is trusted to see everything: half of its width for each metre.
+    /// Takes in that a reading of `range_m` along the x axis of `eye` passes through what lies before its
+    /// end. `slope` is how wide the view is that is trusted to see everything: half of its width for each
+    /// metre.
     pub fn see_through(&mut self, eye: Pose2, range_m: f64, slope: f64) {
         let passed_m = range_m.min(SEEN_WITHIN_M) - PASSED_M;
         let frame = eye.frame();
@@ -107,21 +109,23 @@ impl Sightings {
         }
     }
 
-    /// Takes in a reading of a time-of-flight sensor at `eye` that ends nearby: its middle and two points beside it stand for its cone.
+    /// Takes in a reading of a time-of-flight sensor at `eye` that ends nearby: its middle and two points
+    /// beside it stand for its cone.
     pub fn add_reading(&mut self, now: Time, eye: Pose2, range_m: f64) {
         for share in [-SURE_SHARE, 0.0, SURE_SHARE] {
             self.add(now, eye.transform(Point2::new(range_m, share * HALF_CONE * range_m)));
         }
     }
 
-    /// Lets everything be as old as it was so long ago.
+    /// Lets everything be as old as it was this long ago.
     pub fn hold(&mut self, time: std::time::Duration) {
         for point in &mut self.points {
             point.seen = point.seen.after(time);
         }
     }
 
-    /// Keeps what lies at such places for as long again, once, when it would be forgotten for its age, and marks it as old.
+    /// Keeps what lies at such places for as long again, once, when it would be forgotten for its age, and
+    /// marks it as old.
     pub fn keep_old(&mut self, now: Time, is_kept: impl Fn(Point2<f64>) -> bool) {
         for point in self.points.iter_mut().filter(|point| now.seconds_since(point.seen) > KEPT_S) {
             if !point.is_old && is_kept(point.place) {
@@ -154,8 +158,8 @@ impl Sightings {
 pub const TOF_SLOPE: f64 = SURE_SHARE * HALF_CONE;
 
 impl TofRanges {
-    /// What each sensor of a robot at `here` looks at: its eye, and how far it sees; infinite where it sees nothing. Sensors without news
-    /// are left out.
+    /// What each sensor of a robot at `here` looks at: its eye, and how far it sees; infinite where it sees
+    /// nothing. Sensors without news are left out.
     pub fn looks(&self, here: Pose2) -> impl Iterator<Item = (Pose2, f64)> + Clone + '_ {
         (0..TOF_COUNT).filter_map(move |sensor| {
             let range_m = match self.reading(sensor) {

@@ -1,4 +1,5 @@
-//! The turning ultrasonic sensor: what it is told, what it says between scans, and what a scan shows at once (NXT-025, NXT-026, NXT-040).
+//! The turning ultrasonic sensor: what it is told, what it says between scans, and what a scan shows at once
+//! (NXT-025, NXT-026, NXT-040).
 //!
 //! Its scans are `RangeScan`s: raw on `sonar/raw`, the part that is kept for localisation on `sonar/scan`.
 
@@ -8,7 +9,8 @@ use zerocopy::{FromBytes, Immutable, IntoBytes, KnownLayout};
 crate::state! {
     /// What the sensor shall do.
     SonarMode, SonarModeName {
-        /// Look ahead, and say what is there: what it does by itself after its start, and after a scan (NXT-026).
+        /// Look ahead, and say what is there: what it does by itself after its start, and after a scan
+        /// (NXT-026).
         WatchAhead = 0,
         /// Turn once around and publish the scan, turn back, then watch ahead (NXT-025).
         Ultrascan = 1,
@@ -23,7 +25,8 @@ crate::state! {
 pub struct SonarCommand {
     /// Counts orders. Zero is none.
     pub command_id: u64,
-    /// Direction of the first of the four windows of a measuring scan in the robot's frame; the others follow at right angles.
+    /// Direction of the first of the four windows of a measuring scan in the robot's frame; the others follow
+    /// at right angles.
     pub window_rad: f64,
     /// What to do.
     pub mode: SonarMode,
@@ -45,7 +48,8 @@ crate::state! {
     }
 }
 
-/// What lies ahead of the robot. Published by `ultrasonic-driver` on `sonar/ahead`, while the sensor watches ahead.
+/// What lies ahead of the robot. Published by `ultrasonic-driver` on `sonar/ahead`, while the sensor watches
+/// ahead.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]
 pub struct SonarAhead {
@@ -58,7 +62,8 @@ pub struct SonarAhead {
 }
 
 impl SonarAhead {
-    /// The distance of the nearest thing ahead, infinite where nothing is; `None` when the message says nothing of use.
+    /// The distance of the nearest thing ahead, infinite where nothing is; `None` when the message says
+    /// nothing of use.
     pub fn distance_m(&self) -> Option<f64> {
         match self.status.get().ok()? {
             SonarStatusName::Echo | SonarStatusName::TooNear => {
@@ -78,7 +83,7 @@ pub struct WallSurvey {
     pub command_id: u64,
     /// Direction of the nearest wall in the robot's frame, in (-π, π]; NaN when there is none.
     pub bearing_rad: f64,
-    /// Its distance; NaN when there is none.
+    /// Distance of the nearest wall; NaN when there is none.
     pub range_m: f64,
     /// The windows of a measuring scan that were kept: one bit each, the first one is bit 0.
     pub kept_windows: u32,

@@ -30,7 +30,8 @@ pub struct Metric {
 /// How many figures a summary can hold.
 pub const METRIC_CAPACITY: usize = 24;
 
-/// The run so far, measured against the truth. Published by a referee on `run/summary`; the launcher ends the run when it is over.
+/// The run so far, measured against the truth. Published by a referee on `run/summary`; the launcher ends the
+/// run when it is over.
 #[derive(Debug, Clone, Copy, Default, PartialEq, FromBytes, IntoBytes, Immutable, KnownLayout, Message)]
 #[repr(C)]
 pub struct RunSummary {

@@ -64,7 +64,8 @@ impl Surroundings {
         built
     }
 
-    /// Moves everything to where the truth has it. Bodies that the world file does not have, and poses that are none, are left out.
+    /// Moves everything to where the truth has it. Bodies that the world file does not have, and invalid
+    /// poses, are left out.
     pub fn show(&mut self, truth: &WorldTruth, bodies: &[TrueBody]) {
         for (placed, now) in self.bodies.iter_mut().zip(bodies) {
             let pose = Pose2 { x_m: now.x_m, y_m: now.y_m, heading_rad: now.heading_rad };

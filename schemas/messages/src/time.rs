@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-/// A moment on the board's clock, in nanoseconds. Live it is the host's monotonic clock; in lockstep it is logical time.
-/// No service can tell which.
+/// A moment on the board's clock, in nanoseconds. Live it is the host's monotonic clock; in lockstep it is
+/// logical time. No service can tell which.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Time(u64);
 

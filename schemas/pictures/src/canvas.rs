@@ -28,8 +28,8 @@ pub fn px(pixels: f64) -> i32 {
     (pixels * QUARTERS).round() as i32
 }
 
-/// The SVG text of a drawing of so many pixels. The title is what a browser shows of it and a screen reader
-/// reads; it has to be written on the canvas too.
+/// The SVG text of a drawing of this size in pixels. The title is what a browser shows of it and a screen
+/// reader reads; it has to be written on the canvas too.
 ///
 /// # Errors
 /// When `with` does not succeed.
@@ -78,12 +78,12 @@ pub fn text_at(
     canvas.draw(&Text::new(words.to_owned(), at, style.clone())).map_err(PictureError::of)
 }
 
-/// The same letters, bold.
+/// These letters, bold.
 pub fn bold(style: TextStyle<'static>) -> TextStyle<'static> {
     TextStyle { font: style.font.clone().style(FontStyle::Bold), ..style }
 }
 
-/// The same letters, read from below to above.
+/// These letters, read from below to above.
 pub fn upright(style: TextStyle<'static>) -> TextStyle<'static> {
     TextStyle { font: style.font.clone().transform(FontTransform::Rotate270), ..style }
 }

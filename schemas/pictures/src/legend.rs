@@ -20,7 +20,7 @@ pub enum Glyph {
     Dot(f64),
     /// A circle of this radius in pixels, drawn two pixels wide.
     Ring(f64),
-    /// A cross that reaches so many pixels from its middle.
+    /// A cross that reaches this many pixels from its middle.
     Cross(f64),
     /// A dot with a line of this length in pixels towards a heading.
     Arrow(f64),

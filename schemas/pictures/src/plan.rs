@@ -50,7 +50,7 @@ impl Layer {
         Self::new(words, colour, glyph, Shape::Places(places))
     }
 
-    /// A dot at each pose, with a line of so many pixels towards its heading.
+    /// A dot at each pose, with a line of this many pixels towards its heading.
     pub fn poses(words: &str, colour: RGBColor, length_px: f64, poses: Vec<Pose2>) -> Self {
         Self::new(words, colour, Glyph::Arrow(length_px), Shape::Poses(poses))
     }
@@ -94,7 +94,7 @@ impl Layer {
         Self::new("", BLACK, Glyph::Dot(0.0), Shape::Names(names))
     }
 
-    /// The same, of which this share covers what is below.
+    /// This layer, of which this share covers what is below.
     #[must_use]
     pub fn covering(mut self, share: f64) -> Self {
         self.entry.colour = self.entry.colour.mix(share);
@@ -118,7 +118,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan of the ground between two corners, as large as fits into so many pixels to each side. With a
+    /// A plan of the ground between two corners, as large as fits into this many pixels to each side. With a
     /// title of its own where there are several on a sheet.
     pub fn new(title: &str, low: Point2<f64>, high: Point2<f64>, [width_px, height_px]: [f64; 2]) -> Self {
         let side = |low: f64, high: f64| if high - low > 1e-9 { high - low } else { 1.0 };

@@ -1,4 +1,5 @@
-//! Where the angle may be measured: the marked areas of the floor plan, and stretches of wall without doors (COF-083, X-2A).
+//! Where the angle may be measured: the marked areas of the floor plan, and stretches of wall without doors
+//! (COF-083, X-2A).
 
 use crate::Params;
 use geometry::{
@@ -97,8 +98,8 @@ impl Areas {
 }
 
 impl Floor {
-    /// The wall beside the robot, and whether both sensors of the side look at it. `None` without a wall, and when a sensor looks at
-    /// a door.
+    /// The wall beside the robot, and whether both sensors of the side look at it. `None` without a wall, and
+    /// when a sensor looks at a door.
     fn facing(&self, pose: Pose2, side: Side) -> Option<(usize, bool)> {
         let (back, front) = if side == Side::Right { (0, 1) } else { (7, 6) };
         let look = |sensor: usize| {
@@ -128,7 +129,8 @@ impl Floor {
         (range_m <= FARTHEST_M).then(|| (index, from.position() + direction * range_m))
     }
 
-    /// Whether `point` on wall `other` lies on the line of `wall`, as where one polyline ends and the next goes on.
+    /// Whether `point` on wall `other` lies on the line of `wall`, as where one polyline ends and the next
+    /// goes on.
     fn is_same_wall(&self, wall: usize, other: usize, point: Point2<f64>) -> bool {
         if wall == other {
             return true;
@@ -141,7 +143,8 @@ impl Floor {
     }
 }
 
-/// What is left of a wall when the doors on it, each with a margin, are taken out, and the margin at its ends.
+/// What is left of a wall when the doors on it, each with a margin, are taken out, and the margin at its
+/// ends.
 fn free_stretches<'a>(
     wall: &'a Segment,
     gaps: &[Segment],

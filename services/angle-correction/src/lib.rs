@@ -1,11 +1,12 @@
-//! Measures how many degrees the robot has veered off the hallway's straight line, from the two wall distances of one side, in places
-//! where the floor plan shows flat wall. Source: the coffee robot's paper, sections III.B, IV.B and V.B (COF-080 to COF-093), with
-//! the gaps settled in X-20 (both sides qualify: the nearer one), X-21 (what is worth a correction), X-22 (accuracy: averages) and
-//! X-2A (sign and areas).
+//! Measures how many degrees the robot has veered off the hallway's straight line, from the two wall
+//! distances of one side, in places where the floor plan shows flat wall. Source: the coffee robot's paper,
+//! sections III.B, IV.B and V.B (COF-080 to COF-093), with the gaps settled in X-20 (both sides qualify: the
+//! nearer one), X-21 (what is worth a correction), X-22 (accuracy: averages) and X-2A (sign and areas).
 //!
-//! On entering an area the first frame is published at once; from `averaged_frames` frames on every frame gives an average. With
-//! odometry the average follows the robot's turning: what is averaged is the difference between the angle and the odometry's
-//! heading. On leaving, or when an obstacle comes, one message says that nothing is measured.
+//! On entering an area the first frame is published at once; from `averaged_frames` frames on every frame
+//! gives an average. With odometry the average follows the robot's turning: what is averaged is the
+//! difference between the angle and the odometry's heading. On leaving, or when an obstacle comes, one
+//! message says that nothing is measured.
 
 mod areas;
 mod params;
@@ -42,19 +43,20 @@ pub struct Outputs {
     pub correction: Option<HeadingCorrection>,
 }
 
-/// The angle between robot and wall in radians from the distances (in metres) of a side's front and back sensors: nose to the left is
-/// positive (COF-081, X-2A).
+/// The angle between robot and wall in radians from the distances (in metres) of a side's front and back
+/// sensors: nose to the left is positive (COF-081, X-2A).
 pub fn wall_angle_rad(front_m: f64, back_m: f64, side: Side) -> f64 {
     let angle_rad = ((front_m - back_m) / TofRanges::SIDE_BASE_M).atan();
     if side == Side::Left { -angle_rad } else { angle_rad }
 }
 
-/// Standard deviation of that angle in radians when each distance has that of `range_sigma_m`: the formula's derivatives.
+/// Standard deviation of that angle in radians when each distance has that of `range_sigma_m`: the formula's
+/// derivatives.
 pub fn wall_angle_sigma_rad(angle_rad: f64, range_sigma_m: f64) -> f64 {
     angle_rad.cos().powi(2) * std::f64::consts::SQRT_2 * range_sigma_m / TofRanges::SIDE_BASE_M
 }
 
-/// After so many outliers in a row the average is wrong, not they.
+/// Outliers in a row after which the average is wrong, not they.
 const OUTLIERS: u32 = 3;
 
 /// A run of measurements in one area at one side.
@@ -89,7 +91,7 @@ impl AngleCorrection {
         Self::with_world(params, &world)
     }
 
-    /// The same with a world that is there already.
+    /// A measurement in a world that is read already.
     ///
     /// # Errors
     /// When the parameters make no sense.
@@ -129,8 +131,8 @@ impl AngleCorrection {
         Outputs { correction }
     }
 
-    /// The newest frame and what it shows of the wall: nothing unless the pose is known, an area allows it, no obstacle is ahead and
-    /// a side qualifies.
+    /// The newest frame and what it shows of the wall: nothing unless the pose is known, an area allows it,
+    /// no obstacle is ahead and a side qualifies.
     fn measure<'a>(
         &self,
         now: Time,

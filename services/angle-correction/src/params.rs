@@ -13,7 +13,8 @@ pub struct Params {
     /// The world file with walls, doors and marked areas; without one nothing is ever measured.
     #[schemars(extend("format" = "path"))]
     pub world: String,
-    /// Whether to measure also along every wall that the world file shows free of doors, not only in its marked areas (X-2A).
+    /// Whether to measure also along every wall that the world file shows free of doors, not only in its
+    /// marked areas (X-2A).
     pub generate_areas: bool,
     /// A generated area keeps this far from a door's edge: at least the sensors' base plus 0.1 m (X-2A).
     #[schemars(range(min = 0.377, max = 3.0))]
@@ -21,13 +22,13 @@ pub struct Params {
     /// Both readings of a side must be below this: half of the hallway's width (COF-086).
     #[schemars(range(min = 0.05, max = 4.0))]
     pub half_hallway_m: f64,
-    /// So many frames make an average; the first frame in an area is published at once, alone (COF-084, X-22).
+    /// Frames that make an average; the first frame in an area is published at once, alone (COF-084, X-22).
     #[schemars(range(min = 1, max = 25))]
     pub averaged_frames: u32,
-    /// An average holds at most so many frames (X-22: 25 for a standard deviation of 0.3 degrees).
+    /// The most frames that an average holds (X-22: 25 for a standard deviation of 0.3 degrees).
     #[schemars(range(min = 1, max = 500))]
     pub window_frames: u32,
-    /// Angles from this on are marked as worth a correction; the default is 5 degrees (COF-092, X-21).
+    /// Angles of at least this are marked as worth a correction; the default is 5 degrees (COF-092, X-21).
     #[schemars(range(min = 0.0, max = 1.5))]
     pub correct_from_rad: f64,
     /// Standard deviation of a reading (COF-021).
@@ -39,10 +40,10 @@ pub struct Params {
     /// A front reading below this is an unexpected obstacle, and nothing is measured (COF-091).
     #[schemars(range(min = 0.0, max = 4.0))]
     pub obstacle_m: f64,
-    /// Readings older than this are none.
+    /// Readings older than this are not used.
     #[schemars(range(min = 10, max = 5000))]
     pub ranges_max_age_ms: u64,
-    /// A pose older than this is none.
+    /// A pose older than this is not used.
     #[schemars(range(min = 10, max = 10_000))]
     pub location_max_age_ms: u64,
 }

@@ -5,7 +5,8 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 
-/// The hallway outside 209 and 210: 1.7 m wide, a marked area between the doors, an open hallway at the right from 5 m to 7 m.
+/// The hallway outside 209 and 210: 1.7 m wide, a marked area between the doors, an open hallway at the right
+/// from 5 m to 7 m.
 const WORLD: &str = r#"
 name = "outside 209 and 210"
 [[floor]]
@@ -325,7 +326,8 @@ fn rms(errors: &[f64]) -> f64 {
     (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
 }
 
-/// COF-093 and X-22, with 5 mm of noise: a single frame is good for 1.5 degrees (one deviation), averages for 1 degree.
+/// COF-093 and X-22, with 5 mm of noise: a single frame is good for 1.5 degrees (one deviation), averages for
+/// 1 degree.
 #[test]
 fn averages_are_good_for_one_degree() {
     for turning in [false, true] {

@@ -42,7 +42,8 @@ pub enum DeviceError {
     },
 }
 
-/// What a motor controller has to offer. The wheels' speeds reach it by [`BaseDevice::drive`], after every step.
+/// What a motor controller has to offer. The wheels' speeds reach it by [`BaseDevice::drive`], after every
+/// step.
 pub trait BaseDevice: std::fmt::Debug {
     /// The newest truth, shown before every step. Only simulated motors look at it.
     fn see(&mut self, _truth: Option<Stamped<'_, WorldTruth>>) {}

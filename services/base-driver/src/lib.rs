@@ -1,17 +1,22 @@
-//! The last link of the chain: the wheels turn only while a fresh GO of the collision guard and a fresh, sound command are at
-//! hand; whatever is missing, late or nonsense means zero at once. The encoders of the two wheels become odometry
-//! (Siegwart and Nourbakhsh 2011, section 5.2.4, with exact arcs).
+//! The last link of the chain: the wheels turn only while a fresh GO of the collision guard and a fresh,
+//! sound command are at hand; whatever is missing, late or nonsense means zero at once. The encoders of the
+//! two wheels become odometry (Siegwart and Nourbakhsh 2011, section 5.2.4, with exact arcs).
 //!
 //! # Whatever a controller asks
-//! - **Ahead** no corner of the hull is faster than the guard's front radius allows: from the age that readings may have, the deadlines and
-//!   the motors' deceleration follows a speed from which the robot stops within it (`speed`).
-//! - **Aside**, in a curve, a corner comes where no sensor looks: the narrower the curve, the slower the robot.
-//! - **Around** the hull moves only where it can stop before it comes too near to anything that the guard sees or has just seen
-//!   (`stopping`); what leads there is done as slowly as it takes, or not at all.
-//! - **Back**, where no sensor looks, it goes only over ground that the hull has just covered, and slowly, as somebody may have stepped
-//!   there (`trail`). That is also the way out when the guard says STOP for something in front.
-//! - A robot whose sensor looks **ahead only** turns and drives as far as was ordered by who has looked around, and no farther (`orders`).
-//! - It **begins** with what the motors do: after a pause, or as a successor, it gains speed from what the encoders show.
+//! - **Ahead** no corner of the hull is faster than the guard's front radius allows: from the age that
+//!   readings may have, the deadlines and the motors' deceleration follows a speed from which the robot stops
+//!   within it (`speed`).
+//! - **Aside**, in a curve, a corner comes where no sensor looks: the narrower the curve, the slower the
+//!   robot.
+//! - **Around** the hull moves only where it can stop before it comes too near to anything that the guard
+//!   sees or has just seen (`stopping`); what leads there is done as slowly as it takes, or not at all.
+//! - **Back**, where no sensor looks, it goes only over ground that the hull has just covered, and slowly, as
+//!   somebody may have stepped there (`trail`). That is also the way out when the guard says STOP for
+//!   something in front.
+//! - A robot whose sensor looks **ahead only** turns and drives as far as was ordered by a service that has
+//!   looked around, and no farther (`orders`).
+//! - It **begins** with what the motors do: after a pause, or as a successor, it gains speed from what the
+//!   encoders show.
 //! - Encoders that jump, or do not show what the wheels are told, are a fault: the wheels rest.
 
 mod device;
@@ -41,11 +46,12 @@ use orders::Orders;
 use std::time::Duration;
 use trail::Trail;
 
-/// A command that leads too near to something is tried so much slower, one after the other.
+/// The shares of its speed at which a command that leads too near to something is tried, one after the other.
 const SHARES: [f64; 6] = [1.0, 0.75, 0.5, 0.3, 0.15, 0.07];
-/// What the guard's side radius keeps free, and a little: so the guard need not stop the robot for what the driver can see coming.
+/// What the guard's side radius keeps free, and a little: so the guard need not stop the robot for what the
+/// driver can see coming.
 const OFF_SIDES_M: f64 = 0.030;
-/// No guard keeps more free at the sides.
+/// The most that a guard keeps free at the sides.
 const MOST_M: f64 = 1.0;
 
 /// What the driver looks at.
@@ -115,8 +121,8 @@ impl BaseDriver {
         })
     }
 
-    /// What a successor needs so that the odometry goes on in the same frame, and to know where it may go back; of the command nothing is
-    /// kept, since who starts begins safe.
+    /// What a successor needs so that the odometry goes on in the same frame, and to know where it may go
+    /// back; of the command nothing is kept, since a driver that starts begins safe.
     pub fn snapshot(&self) -> Option<Snapshot> {
         self.reckoning.snapshot(self.trail.kept())
     }
@@ -160,7 +166,8 @@ impl BaseDriver {
         self.applied
     }
 
-    /// Looks at what the motors do, and where that has brought the robot in the frame of odometry; `None` when nobody knows.
+    /// Looks at what the motors do, and where that has brought the robot in the frame of odometry; `None`
+    /// when nobody knows.
     fn look(&mut self, now: Time, inputs: &Inputs<'_>, encoders: Option<Encoders>) -> Option<Pose2> {
         let Some(encoders) = encoders else {
             self.motors.lose_sight();
@@ -214,7 +221,8 @@ impl BaseDriver {
         }
     }
 
-    /// Whether a command may pass although the guard says STOP: only backwards, and only away from something in front and nowhere else.
+    /// Whether a command may pass although the guard says STOP: only backwards, and only away from something
+    /// in front and nowhere else.
     fn may_escape(&self, clearance: &Clearance, guard_reason: GuardReasonName, wanted: WheelSpeeds) -> bool {
         let in_front_only = clearance.violated_faces == Face::Front as u32;
         let known = matches!(
@@ -286,7 +294,8 @@ impl BaseDriver {
         Ok(speed::slowed(wanted.speeds, &self.hull, params.wheel_track_m, limits))
     }
 
-    /// What the guard knows to be near, as the robot sees it now. A guard that does not know where it saw it knows nothing.
+    /// What the guard knows to be near, as the robot sees it now. A guard that does not know where it saw it
+    /// knows nothing.
     fn near(&self, here: Pose2, clearance: &Stamped<'_, Clearance>) -> Decision<Vec<Point2<f64>>> {
         if self.params.room != Room::Seen {
             return Ok(Vec::new());
@@ -297,8 +306,8 @@ impl BaseDriver {
         Ok(points.map(|point| moved.transform(Point2::new(point.x_m.into(), point.y_m.into()))).collect())
     }
 
-    /// `wanted`, with no wheel gaining more speed than the limit allows since the last step. A wheel that is to turn the other
-    /// way stops first.
+    /// `wanted`, with no wheel gaining more speed than the limit allows since the last step. A wheel that is
+    /// to turn the other way stops first.
     fn speed_up_gently(&self, now: Time, from: WheelSpeeds, wanted: WheelSpeeds) -> WheelSpeeds {
         // After a long pause the step is that of one period: a pause is no reason to jump.
         let gain_mps =

@@ -3,17 +3,18 @@
 use crate::{Encoders, Params};
 use messages::{Time, WheelSpeeds};
 
-/// Speeds are taken over at least so long, so that the encoders' own period does not show ...
+/// The shortest time over which speeds are taken, so that the encoders' own period does not show.
 const LEAST_S: f64 = 0.015;
-/// ... and at most so long: over a longer pause only the mean is known.
+/// The longest time over which speeds are taken: over a longer pause only the mean is known.
 const MOST_S: f64 = 0.12;
 /// Faster than this no wheel of such a robot turns: a larger jump is an encoder that began anew.
 pub(crate) const FASTEST_MPS: f64 = 5.0;
-/// After such a jump the wheels rest for so long.
+/// How long the wheels rest after the encoders have jumped.
 const SETTLE_S: f64 = 0.2;
-/// A wheel that is told at least this ...
+/// A wheel that is told at least this is watched for whether it turns.
 const TOLD_MPS: f64 = 0.05;
-/// ... and shows less than this share of it for so long does not turn, or nobody sees that it does.
+/// A watched wheel that shows less than this share of what it is told, for [`FOLLOWS_WITHIN_S`], does not
+/// turn, or nobody sees that it does.
 const FOLLOWS_SHARE: f64 = 0.1;
 const FOLLOWS_WITHIN_S: f64 = 0.5;
 /// Speed that a wheel gains from one look to the next is a sign of life.
@@ -78,8 +79,8 @@ impl Motors {
         }
     }
 
-    /// Whether the encoders can be believed, and the wheels turn when they are told to. A wheel that did not may try again when it was
-    /// asked for rest, or for the other direction.
+    /// Whether the encoders can be believed, and the wheels turn when they are told to. A wheel that did not
+    /// may try again when it was asked for rest, or for the other direction.
     pub(crate) fn follow(&mut self, now: Time, wanted: WheelSpeeds) -> bool {
         for (side, wanted_mps) in [wanted.left_mps, wanted.right_mps].into_iter().enumerate() {
             if self.stuck[side].is_some_and(|sign| wanted_mps * sign <= 0.0) {
@@ -95,8 +96,8 @@ impl Motors {
         self.rims
     }
 
-    /// The speeds from which the wheels gain more: what they were told last, so long ago, unless the motors have not followed or have
-    /// stopped by themselves since.
+    /// The speeds from which the wheels gain more: what they were told last, so long ago, unless the motors
+    /// have not followed or have stopped by themselves since.
     pub(crate) fn begin_from(&self, params: &Params, told: Option<WheelSpeeds>, pause_s: f64) -> WheelSpeeds {
         let Some(told) = told else { return self.rims.unwrap_or(WheelSpeeds::ZERO) };
         let alone_s = (pause_s - f64::from(params.motor_watchdog_ms) * 1e-3).max(0.0);

@@ -64,7 +64,8 @@ impl DeadReckoning {
         })
     }
 
-    /// Goes on where a predecessor was: the encoders tell how far the wheels went meanwhile. Returns the predecessor's trail.
+    /// Goes on where a predecessor was: the encoders tell how far the wheels went meanwhile. Returns the
+    /// predecessor's trail.
     pub(crate) fn restore(&mut self, snapshot: &Snapshot) -> Trail {
         let Snapshot { x_m, y_m, heading_rad, travelled, encoders, ref trail } = *snapshot;
         let numbers = [x_m, y_m, heading_rad].into_iter().chain(travelled).chain(encoders);

@@ -1,10 +1,10 @@
-//! What was ordered, for a robot whose sensor looks ahead only: it turns and drives as far as whoever gave the order has looked, and no
-//! farther, whatever the controller makes of the order.
+//! What was ordered, for a robot whose sensor looks ahead only: it turns and drives as far as the service
+//! that gave the order has looked, and no farther, whatever the controller makes of the order.
 
 use geometry::{Pose2, angle};
 use messages::{MotionCommand, MotionKindName};
 
-/// A motion may lead so far beyond what was ordered, and so far beside it: a centimetre and two degrees.
+/// How far a motion may lead beyond what was ordered, and beside it: a centimetre and two degrees.
 const BEYOND_M: f64 = 0.010;
 const BEYOND_RAD: f64 = 0.035;
 
@@ -27,7 +27,8 @@ impl Orders {
         self.last = here;
     }
 
-    /// Whether the robot may come to these places, given as seen from where it is now: nowhere without an order.
+    /// Whether the robot may come to these places, given as seen from where it is now: nowhere without an
+    /// order.
     pub(crate) fn allows(&self, places: &[Pose2]) -> bool {
         let Some(begin) = self.begin else { return false };
         let [[back_m, ahead_m], [right_rad, left_rad]] = self.reach();
@@ -40,7 +41,8 @@ impl Orders {
         })
     }
 
-    /// How far back and ahead, and how far to the right and to the left; nothing for an order without a meaning.
+    /// How far back and ahead, and how far to the right and to the left; nothing for an order without a
+    /// meaning.
     fn reach(&self) -> [[f64; 2]; 2] {
         // What is not finite is no order.
         let sound = |amount: f64| if amount.is_finite() { amount } else { 0.0 };

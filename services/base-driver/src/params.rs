@@ -22,10 +22,11 @@ pub enum Room {
     /// Where nothing is that the guard sees or has just seen; back only over ground that it has just covered.
     #[default]
     Seen,
-    /// Where it was ordered on `motion/command`: for a robot whose sensor looks ahead only, and whose orders come from who has looked
-    /// around.
+    /// Where it was ordered on `motion/command`: for a robot whose sensor looks ahead only, and whose orders
+    /// come from a service that has looked around.
     Ordered,
-    /// Wherever the controller wants, as fast as it wants, while the signal is GO: for experiments with the guard alone.
+    /// Wherever the controller wants, as fast as it wants, while the signal is GO: for experiments with the
+    /// guard alone.
     Unchecked,
 }
 
@@ -35,20 +36,23 @@ pub enum Room {
 pub struct Params {
     /// What drives the wheels.
     pub device: Device,
-    /// A step at least so often, and odometry exactly so often.
+    /// Period of the odometry, and the longest time from one step to the next.
     #[schemars(range(min = 5, max = 50))]
     pub period_ms: u32,
-    /// The wheels stop when the guard's last GO is older. The guard speaks at least every 50 ms, so 100 ms is one word missed.
+    /// The wheels stop when the guard's last GO is older than this. The guard speaks at least every 50 ms, so
+    /// 100 ms is one word missed.
     #[schemars(range(min = 10, max = 1000))]
     pub guard_deadline_ms: u32,
-    /// The wheels stop when the last command is older. A controller at 20 Hz may be a whole period late and not more: a longer
-    /// deadline would only hide that it missed a step, and a stop of a few milliseconds is smoothed by the motors' own ramps.
+    /// The wheels stop when the last command is older than this. A controller at 20 Hz may be a whole period
+    /// late and not more: a longer deadline would only hide that it missed a step, and a stop of a few
+    /// milliseconds is smoothed by the motors' own ramps.
     #[schemars(range(min = 10, max = 1000))]
     pub command_deadline_ms: u32,
-    /// The wheels stop when the encoders were last heard longer ago.
+    /// The wheels stop when the encoders were last heard longer ago than this.
     #[schemars(range(min = 10, max = 1000))]
     pub device_deadline_ms: u32,
-    /// The motors stop by themselves when they hear nothing for so long. Until then a hanging driver's last word holds.
+    /// The motors stop by themselves when they hear nothing for this long. Until then a hanging driver's last
+    /// word holds.
     #[schemars(range(min = 10, max = 1000))]
     pub motor_watchdog_ms: u32,
     /// A command with a wheel faster than this is nonsense.
@@ -60,7 +64,8 @@ pub struct Params {
     /// A wheel gains speed no faster than this; it loses speed as fast as the motor can.
     #[schemars(range(min = 0.05, max = 10.0))]
     pub max_speed_up_m_per_s2: f64,
-    /// So fast the motors lose speed at least, fully loaded: all ways in which the robot stops are worked out from it.
+    /// The least deceleration of the motors, fully loaded: all ways in which the robot stops are worked out
+    /// from it.
     #[schemars(range(min = 0.05, max = 20.0))]
     pub deceleration_m_per_s2: f64,
     /// Distance between the middles of the two driven wheels.
@@ -75,22 +80,24 @@ pub struct Params {
     /// From the turning centre to the hull's sides.
     #[schemars(range(min = 0.01, max = 5.0))]
     pub hull_side_m: f64,
-    /// What the guard watches ahead of the hull, for the check of `top_speed_mps`; while it runs the guard's own word counts.
+    /// What the guard watches ahead of the hull, for the check of `top_speed_mps`; while it runs the guard's
+    /// own word counts.
     #[schemars(range(min = 0.0, max = 4.0))]
     pub front_radius_m: f64,
-    /// How old the readings behind a GO may be, for the same check.
+    /// How old the readings behind a GO may be, for the check of `top_speed_mps`.
     #[schemars(range(min = 10, max = 5000))]
     pub max_age_ms: u32,
     /// Where the hull may go.
     pub room: Room,
-    /// The fastest that the robot goes back, over ground that it has just covered: slow enough that who has stepped there meanwhile is
-    /// pushed rather than hit. From 0.1 m/s it stands within 2 cm.
+    /// The fastest that the robot goes back, over ground that it has just covered: slow enough that a person
+    /// who has stepped there meanwhile is pushed rather than hit. From 0.1 m/s it stands within 2 cm.
     #[schemars(range(min = 0.01, max = 0.3))]
     pub reverse_speed_mps: f64,
-    /// So much of the way just driven is remembered for that.
+    /// How much of the way just driven is remembered, so that the robot can go back over it.
     #[schemars(range(min = 0.0, max = 2.0))]
     pub trail_m: f64,
-    /// Whether a STOP for something in front only lets the robot go back over such ground, so that it can free itself.
+    /// Whether a STOP only for something in front lets the robot go back over ground that it has just
+    /// covered, so that it can free itself.
     pub allow_escape: bool,
 }
 

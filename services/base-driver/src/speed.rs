@@ -7,8 +7,8 @@ use messages::{Clearance, WheelSpeeds};
 /// So near to a corner of the hull may be what no sensor has seen.
 const ASIDE_M: f64 = 0.03;
 
-/// The speed from which a robot that first goes on for `reaction_s` and then loses `deceleration` stops within `way_m`:
-/// v·t + v²/2a = way (note 2.5).
+/// The speed from which a robot that first goes on for `reaction_s` and then loses `deceleration` stops
+/// within `way_m`: v·t + v²/2a = way (note 2.5).
 pub(crate) fn fastest_mps(way_m: f64, reaction_s: f64, deceleration_m_per_s2: f64) -> f64 {
     let lost_mps = deceleration_m_per_s2 * reaction_s;
     (lost_mps * lost_mps + 2.0 * deceleration_m_per_s2 * way_m.max(0.0)).sqrt() - lost_mps
@@ -20,23 +20,25 @@ pub(crate) fn stopping_way_m(speed_mps: f64, reaction_s: f64, deceleration_m_per
 }
 
 impl Params {
-    /// So old can the newest reading be while the wheels still turn: as old as the guard lets it be behind a GO, and as old as the driver
-    /// lets the GO be, one step later.
+    /// So old can the newest reading be while the wheels still turn: as old as the guard lets it be behind a
+    /// GO, and as old as the driver lets the GO be, one step later.
     pub(crate) fn reaction_s(&self, max_age_ms: u32) -> f64 {
         f64::from(max_age_ms.saturating_add(self.guard_deadline_ms).saturating_add(self.period_ms)) * 1e-3
     }
 }
 
-/// How fast the guard's word allows the hull to be ahead; `None` when it names no way in which the robot could stop.
+/// How fast the guard's word allows the hull to be ahead; `None` when it names no way in which the robot
+/// could stop.
 pub(crate) fn ahead_mps(params: &Params, clearance: &Clearance, way_m: f32) -> Option<f64> {
     let reaction_s = params.reaction_s(clearance.max_age_ms);
     let speed_mps = fastest_mps(f64::from(way_m).min(1e6), reaction_s, params.deceleration_m_per_s2);
     (way_m > 0.0 && clearance.front_radius_m > 0.0 && speed_mps > 0.0).then_some(speed_mps)
 }
 
-/// How fast the robot may be ahead in such a curve: before it stands, the corner of its front that goes aside has come aside by no more than
-/// `ASIDE_M`. The sensors in front look ahead, and those at the side see a thing only when that corner is beside it already. (A turn on the
-/// spot shows them nothing new, and need not be slower for that.)
+/// How fast the robot may be ahead in such a curve: before it stands, the corner of its front that goes aside
+/// has come aside by no more than `ASIDE_M`. The sensors in front look ahead, and those at the side see a
+/// thing only when that corner is beside it already. (A turn on the spot shows them nothing new, and need not
+/// be slower for that.)
 pub(crate) fn curving_mps(
     wanted: WheelSpeeds,
     hull: &Hull,
@@ -57,8 +59,9 @@ pub(crate) fn curving_mps(
     }
 }
 
-/// The same motion, slower: no corner of the hull faster than `corner_mps`, the robot no faster ahead than `ahead_mps` and back than
-/// `back_mps`, and no wheel faster than `wheel_mps`. Both wheels alike, so that the curve stays the same.
+/// The wanted motion, slower: no corner of the hull faster than `corner_mps`, the robot no faster ahead than
+/// `ahead_mps` and back than `back_mps`, and no wheel faster than `wheel_mps`. Both wheels alike, so that the
+/// curve stays the same.
 pub(crate) fn slowed(
     wanted: WheelSpeeds,
     hull: &Hull,

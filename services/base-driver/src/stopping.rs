@@ -4,19 +4,20 @@ use crate::Params;
 use geometry::{Frame, Hull, Point2, Pose2};
 use messages::WheelSpeeds;
 
-/// The motion is followed in steps of this length while a command holds, and of that length while the wheels come to rest.
+/// The motion is followed in steps of this length while a command holds, and of that length while the wheels
+/// come to rest.
 const HELD_STEP_S: f64 = 0.025;
 const BRAKING_STEP_S: f64 = 0.05;
 /// However slowly the motors brake: the rest of the way is not looked at.
 const STEPS_MAX: usize = 60;
-/// A robot that stands nearer to something than it should may drive on beside it, no nearer but for this, for noise, until it is so much
-/// nearer; and what is nearer still may not come nearer at all.
+/// A robot that stands nearer to something than it should may drive on beside it, no nearer but for this, for
+/// noise, until it is so much nearer; and what is nearer still may not come nearer at all.
 const NOISE_M: f64 = 0.001;
 const NEARER_SHARE: f64 = 0.75;
 const NEAREST_SHARE: f64 = 0.5;
 
-/// Where the robot is, seen from where it is now, until it stands: the wheels turn as `now`, are told `told` until the motors' watchdog
-/// knows that nobody tells them anything any more, and brake.
+/// Where the robot is, seen from where it is now, until it stands: the wheels turn as `now`, are told `told`
+/// until the motors' watchdog knows that nobody tells them anything any more, and brake.
 pub(crate) fn way(params: &Params, now: WheelSpeeds, told: WheelSpeeds) -> Vec<Pose2> {
     let held_s = f64::from(params.motor_watchdog_ms) * 1e-3;
     let (mut rims, mut pose, mut time_s) = (now, Pose2::IDENTITY, 0.0);

@@ -358,7 +358,8 @@ fn parsed<T: Message + Default>(bytes: &[u8]) -> T {
 }
 
 proptest! {
-    /// Any bytes on any of the topics: the wheels rest, or carry out a command within the limits and with a reason.
+    /// Any bytes on any of the topics: the wheels rest, or carry out a command within the limits and with a
+    /// reason.
     #[test]
     fn whatever_comes_the_wheels_rest_or_obey_within_limits(
         words in proptest::collection::vec((bytes::<Clearance>(), bytes::<WheelSpeeds>(), bytes::<MotionCommand>(), any::<[u8; 16]>(), any::<[f32; 4]>(), 0u8..32, 0u64..200), 1..40),

@@ -1,17 +1,20 @@
-//! The ground that the hull has just covered: the only one over which it may go back, as no sensor looks there.
+//! The ground that the hull has just covered: the only one over which it may go back, as no sensor looks
+//! there.
 
 use geometry::{Hull, Point2, Pose2, angle};
 use std::collections::VecDeque;
 
-/// Poses of the trail lie so far apart, or differ by so much: between two of them no corner of the hull swings out by more than what it may
-/// lie beside the ground that it has covered.
+/// Poses of the trail lie so far apart, or differ by so much: between two of them no corner of the hull
+/// swings out by more than what it may lie beside the ground that it has covered.
 const APART_M: f64 = 0.03;
 const APART_RAD: f64 = 0.02;
-/// So many are remembered at most: more than a metre of them, or a good quarter of a turn.
+/// The most poses that are remembered: more than a metre of them, or a good quarter of a turn.
 const POSES_MAX: usize = 96;
-/// The hull may lie so far beside the ground that it has covered: less than what the odometry errs by on the way.
+/// How far the hull may lie beside the ground that it has covered: less than what the odometry errs by on the
+/// way.
 const BESIDE_M: f64 = 0.01;
-/// And so far beside its sides, where the side sensors have looked when it passed: what they saw is known, and kept off from.
+/// How far the hull may lie beside its sides, where the side sensors have looked when it passed: what they
+/// saw is known, and kept off from.
 const ASIDE_M: f64 = 0.06;
 /// Points along the hull's rear edge and rear sides that are looked at.
 const ALONG_REAR: i32 = 8;
@@ -24,7 +27,8 @@ pub(crate) struct Trail {
 }
 
 impl Trail {
-    /// For a successor: in tenths of a millimetre and of a thousandth of a radian, which is as fine as it has to be.
+    /// For a successor: in tenths of a millimetre and of a thousandth of a radian, which is as fine as it has
+    /// to be.
     pub(crate) fn kept(&self) -> Vec<[i64; 3]> {
         let fine =
             |pose: &Pose2| [pose.x_m, pose.y_m, pose.heading_rad].map(|number| (number * 1e4).round() as i64);
@@ -45,7 +49,8 @@ impl Trail {
         self.poses.clear();
     }
 
-    /// The robot is here now. The trail grows while it drives ahead or turns, and shrinks while it drives back.
+    /// The robot is here now. The trail grows while it drives ahead or turns, and shrinks while it drives
+    /// back.
     pub(crate) fn follow(&mut self, here: Pose2, length_m: f64) {
         let Some(&last) = self.poses.back() else {
             self.poses.push_back(here);

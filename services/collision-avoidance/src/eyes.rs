@@ -1,5 +1,5 @@
-//! Whether the time-of-flight sensors see at all. "Nothing there" is the answer of an empty hallway, and also that of a sensor whose
-//! light is lost: so emptiness must be confirmed now and then.
+//! Whether the time-of-flight sensors see at all. "Nothing there" is the answer of an empty hallway, and also
+//! that of a sensor whose light is lost: so emptiness must be confirmed now and then.
 
 use crate::{Params, memory::Motion};
 use geometry::Pose2;
@@ -8,11 +8,11 @@ use std::ops::Range;
 
 /// The sensors of each face.
 const FACES: [(Face, Range<usize>); 3] = [(Face::Right, 0..2), (Face::Front, 2..6), (Face::Left, 6..8)];
-/// What a neighbour sees so near, a sensor sees as well.
+/// What a neighbour sees nearer than this, a sensor sees as well.
 const NEIGHBOUR_SEES_M: f32 = 0.5;
 /// Farther ahead a sensor at the usual height sees the floor, which stays where it is.
 const SURELY_A_THING_M: f32 = 0.9;
-/// A robot does not get so far from one frame to the next.
+/// A robot does not get this far from one frame to the next.
 const JUMP_M: f64 = 0.5;
 
 /// What is known of the sensors' sight.
@@ -52,7 +52,8 @@ impl Eyes {
             }
         }
         let same = self.last.replace(*ranges).is_some_and(|last| last == *ranges);
-        // What is seen ahead comes nearer when the robot drives; walls beside it may well stay where they are.
+        // What is seen ahead comes nearer when the robot drives; walls beside it may well stay where they
+        // are.
         let is_thing =
             |sensor: usize| matches!(ranges.reading(sensor), Reading::Distance(m) if m < SURELY_A_THING_M);
         let sees_ahead = FACES[1].1.clone().any(is_thing);
@@ -83,7 +84,8 @@ impl Eyes {
     }
 }
 
-/// Whether a sensor has told of light that was too little or too scattered: that is no target, and no emptiness either.
+/// Whether a sensor has told of light that was too little or too scattered: that is no target, and no
+/// emptiness either.
 fn is_scatter(ranges: &TofRanges, sensor: usize) -> bool {
     let status = ranges.status.get(sensor).and_then(|status| status.get().ok());
     matches!(status, Some(RangeStatusName::SigmaFail | RangeStatusName::SignalFail))

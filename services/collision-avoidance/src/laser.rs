@@ -5,9 +5,10 @@ use geometry::{Hull, Point2, angle};
 use messages::{Face, RangeScan, Stamped};
 use std::f64::consts::FRAC_PI_2;
 
-/// Something so wide is an obstacle: where it could hide between two beams that can be read, it counts as there.
+/// Something this wide is an obstacle: where it could hide between two beams that can be read, it counts as
+/// there.
 const HIDDEN_M: f64 = 0.10;
-/// Gaps are looked at in directions so far apart.
+/// Angle between the directions in which gaps are looked at.
 const GAP_STEP_RAD: f64 = 0.02;
 /// Beams this much farther apart than usual have a gap between them.
 const GAP_STEPS: f64 = 1.5;
@@ -87,8 +88,8 @@ impl<'a> Scan<'a> {
         })
     }
 
-    /// The directions in which a face must be seen: the front over the hull's width and margin, a side from its front corner to straight
-    /// aside. Farther back the robot has been already.
+    /// The directions in which a face must be seen: the front over the hull's width and margin, a side from
+    /// its front corner to straight aside. Farther back the robot has been already.
     fn sector(&self, face: Face, params: &Params) -> [f64; 2] {
         let (x_m, y_m) = (self.header.sensor_x_m, self.header.sensor_y_m);
         let wide_m = params.hull_side_m + params.laser_margin_m;
@@ -118,8 +119,8 @@ impl<'a> Scan<'a> {
         self.beams().any(|(direction_rad, beam)| beam == Beam::TooNear && concerns(direction_rad))
     }
 
-    /// From the hull to the nearest place at which something could hide from the beams that can be read; `None` where it could be within
-    /// the face's radius, or most beams of the sector say nothing.
+    /// From the hull to the nearest place at which something could hide from the beams that can be read;
+    /// `None` where it could be within the face's radius, or most beams of the sector say nothing.
     fn hidden_m(&self, face: Face, [from_rad, to_rad]: [f64; 2], params: &Params) -> Option<f64> {
         let mut readable: Vec<f64> = Vec::new();
         let (mut within, mut blind) = (0_usize, 0_usize);

@@ -1,29 +1,35 @@
-//! Says whether the robot may move: GO only while every distance sensor confirms that nothing is within a private sphere around the
-//! body, STOP in every other case. Source: the coffee robot's paper, sections III.A, IV.A and V.A (COF-060 to COF-070), with the gaps
-//! settled in X-23 (bad and stale readings), X-24 (mail cart), X-27 (sides) and X-2B (a radius for each face).
+//! Says whether the robot may move: GO only while every distance sensor confirms that nothing is within a
+//! private sphere around the body, STOP in every other case. Source: the coffee robot's paper, sections
+//! III.A, IV.A and V.A (COF-060 to COF-070), with the gaps settled in X-23 (bad and stale readings), X-24
+//! (mail cart), X-27 (sides) and X-2B (a radius for each face).
 //!
 //! # What the signal means
 //! - STOP from the start until every sensor gave `clear_frames` clear readings in a row (COF-061, COF-070).
-//! - A reading **lower than** its face's radius is a STOP at once (COF-062, COF-063); 200 mm in front, 50 mm at the sides (COF-064).
-//! - "No target" is far. A broken sensor, a number that is none, or silence for more than `max_age_ms` is a STOP (COF-069).
-//! - A front obstacle nearer than `memory_m` that vanishes from one reading to the next, while the robot did not back off or turn
-//!   away, is remembered where it was last seen. It stops the robot like a visible one, until the sensors have been clear for
-//!   `memory_release_s` without forward motion, or the robot has backed off so far that it would be seen again. Without odometry
-//!   its distance counts as zero. `strict_paper` switches memory off and lets one clear frame release the stop.
+//! - A reading **lower than** its face's radius is a STOP at once (COF-062, COF-063); 200 mm in front, 50 mm
+//!   at the sides (COF-064).
+//! - "No target" is far. A broken sensor, an invalid number, or silence for more than `max_age_ms` is a STOP
+//!   (COF-069).
+//! - A front obstacle nearer than `memory_m` that vanishes from one reading to the next, while the robot did
+//!   not back off or turn away, is remembered where it was last seen. It stops the robot like a visible one,
+//!   until the sensors have been clear for `memory_release_s` without forward motion, or the robot has backed
+//!   off so far that it would be seen again. Without odometry its distance counts as zero. `strict_paper`
+//!   switches memory off and lets one clear frame release the stop.
 //!
-//! The ranges published (`front_m` and so on) are what a controller slows down by: a remembered obstacle counts, and a face with a
-//! sensor that cannot be trusted reads 0.
+//! The ranges published (`front_m` and so on) are what a controller slows down by: a remembered obstacle
+//! counts, and a face with a sensor that cannot be trusted reads 0.
 //!
 //! # What "far" has to be confirmed by
-//! - A face is believed when most of what looks out of it can be read: for a laser most beams of the hull's width and margin, with no gap
-//!   in which something could hide within the radius; for time-of-flight sensors half of the face's.
+//! - A face is believed when most of what looks out of it can be read: for a laser most beams of the hull's
+//!   width and margin, with no gap in which something could hide within the radius; for time-of-flight
+//!   sensors half of the face's.
 //! - "Too near to be measured" (-inf) is the nearest there is.
-//! - Sensors that tell nothing but scattered light, that see nothing where their neighbour sees something, or whose readings do not change
-//!   while the robot drives, are broken.
+//! - Sensors that tell nothing but scattered light, that see nothing where their neighbour sees something, or
+//!   whose readings do not change while the robot drives, are broken.
 //!
 //! # What is told beside the signal
-//! The radii, so that `base-driver` holds the robot to a speed from which it stops within them, and the points that are known to be near the
-//! hull (`near`): it moves the hull only where it can stop before it touches one.
+//! The radii, so that `base-driver` holds the robot to a speed from which it stops within them, and the
+//! points that are known to be near the hull (`near`): it moves the hull only where it can stop before it
+//! touches one.
 
 mod eyes;
 mod laser;
@@ -63,9 +69,10 @@ pub struct Inputs<'a> {
 /// What the guard says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outputs<'a> {
-    /// For `safety/clearance`, in every step: the header,
+    /// The header for `safety/clearance`, in every step.
     pub clearance: Clearance,
-    /// and what is near, in the frame of the robot where the header says that it was.
+    /// The elements for `safety/clearance`: what is near, in the frame of the robot where the header says
+    /// that it was.
     pub near: &'a [NearPoint],
 }
 
@@ -76,10 +83,10 @@ pub struct Snapshot {
     near: Vec<KeptSighting>,
 }
 
-/// A pose that is older is none.
+/// A pose that is older than this is not used.
 const POSE_MAX_AGE: Duration = Duration::from_millis(500);
 
-/// Who does not know where the robot is.
+/// The place of a robot that does not know where it is.
 const NOWHERE: Pose2 = Pose2 { x_m: f64::NAN, y_m: f64::NAN, heading_rad: f64::NAN };
 
 /// The nearest reading of each face in metres; infinite when nothing is seen.
@@ -171,7 +178,8 @@ impl CollisionAvoidance {
         self.near.restore(&snapshot.near);
     }
 
-    /// Judges the newest frame; a frame seen before counts once. Call it for every frame and once a heartbeat.
+    /// Judges the newest frame; a frame seen before counts once. Call it for every frame and once a
+    /// heartbeat.
     pub fn step(&mut self, now: Time, inputs: Inputs<'_>) -> Outputs<'_> {
         let motion = self.motion(now, inputs.odometry);
         match self.params.sensor {
@@ -219,8 +227,8 @@ impl CollisionAvoidance {
         }
     }
 
-    /// Whether a frame was not seen before. One stamped farther ahead of now than readings may be old has no meaning and is not
-    /// taken: it would never grow stale.
+    /// Whether a frame was not seen before. One stamped farther ahead of now than readings may be old has no
+    /// meaning and is not taken: it would never grow stale.
     fn is_new<T: messages::Message>(&self, now: Time, frame: &Stamped<'_, T>) -> bool {
         self.frame.is_new(frame) && frame.stamp.since(now) <= self.params.max_age()
     }
@@ -331,7 +339,8 @@ impl CollisionAvoidance {
     }
 }
 
-/// "Lower than the radius" (COF-063), compared in the precision of the sensors: a reading of 0.35 does not violate a radius of 0.35.
+/// "Lower than the radius" (COF-063), compared in the precision of the sensors: a reading of 0.35 does not
+/// violate a radius of 0.35.
 fn is_within(reading_m: f64, radius_m: f64) -> bool {
     (reading_m as f32) < radius_m as f32
 }

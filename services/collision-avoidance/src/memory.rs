@@ -1,4 +1,5 @@
-//! Obstacles that vanish under a beam, such as a mail cart whose shelf drops out of view at close range (Fig. 4, X-24).
+//! Obstacles that vanish under a beam, such as a mail cart whose shelf drops out of view at close range (Fig.
+//! 4, X-24).
 
 use crate::Params;
 use geometry::{Point2, Pose2};
@@ -9,7 +10,8 @@ use serde::{Deserialize, Serialize};
 const FRONT: std::ops::Range<usize> = 2..6;
 const FRONT_COUNT: usize = 4;
 
-/// Half of the sensors' cone (COF-021: at most 27° in all): what leaves it by the robot's own turning has not vanished.
+/// Half of the sensors' cone (COF-021: at most 27° in all): what leaves it by the robot's own turning has not
+/// vanished.
 const HALF_CONE_RAD: f64 = 13.5 * std::f64::consts::PI / 180.0;
 
 /// What the guard may know of the robot's motion at one moment.
@@ -26,7 +28,7 @@ pub(crate) struct Motion {
 struct Sight {
     /// In the robot's frame when it was seen.
     in_body: Point2<f64>,
-    /// The same in the odometry frame, if the robot's motion was known.
+    /// Its place in the odometry frame, if the robot's motion was known.
     in_odometry: Option<Point2<f64>>,
 }
 
@@ -59,7 +61,8 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// What a successor needs: an obstacle that was remembered must not be driven over because the guard was started anew.
+    /// What a successor needs: an obstacle that was remembered must not be driven over because the guard was
+    /// started anew.
     pub(crate) fn snapshot(&self) -> Snapshot {
         let pair = |place: Point2<f64>| [place.x, place.y];
         let kept = |sight: Sight| (pair(sight.in_body), sight.in_odometry.map(pair));
@@ -79,7 +82,8 @@ impl Memory {
         self.vanished = snapshot.vanished.map(|kept| kept.and_then(sight));
     }
 
-    /// Takes in one frame: the new readings of the sensors (`None` where a sensor gave none; infinite for "no target").
+    /// Takes in one frame: the new readings of the sensors (`None` where a sensor gave none; infinite for "no
+    /// target").
     pub(crate) fn take(
         &mut self,
         now: Time,
@@ -135,7 +139,8 @@ impl Memory {
         }
     }
 
-    /// Distance from the robot's front edge to the nearest remembered obstacle ahead; 0 where the motion since is not known.
+    /// Distance from the robot's front edge to the nearest remembered obstacle ahead; 0 where the motion
+    /// since is not known.
     pub(crate) fn nearest_m(&self, motion: Option<Motion>, params: &Params) -> Option<f64> {
         let ahead = |sight: &Sight| match sight.now(motion) {
             None => Some(0.0),
@@ -149,7 +154,8 @@ impl Memory {
     }
 }
 
-/// Whether the robot stands so far back that the sensor, which shows nothing near, would see the obstacle if it were there.
+/// Whether the robot stands so far back that the sensor, which shows nothing near, would see the obstacle if
+/// it were there.
 fn was_backed_off(sight: &Sight, mount: Pose2, motion: Option<Motion>, params: &Params) -> bool {
     sight.now(motion).is_some_and(|here| {
         let relative = mount.inverse_transform(here);

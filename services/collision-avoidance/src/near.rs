@@ -1,5 +1,6 @@
-//! What is near the hull, for who moves it: what the sensors see, what they saw a moment ago when the robot came there, walls beyond the
-//! end of what was seen of them, and the walls of the map while the robot knows where it is.
+//! What is near the hull, for the service that moves it: what the sensors see, what they saw a moment ago
+//! when the robot came there, walls beyond the end of what was seen of them, and the walls of the map while
+//! the robot knows where it is.
 
 use crate::{
     Params,
@@ -12,51 +13,56 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Points farther from the hull than this do not matter to the next motion.
 const TOLD_WITHIN_M: f64 = 0.6;
-/// So many points are told at most, the nearest ones.
+/// The most points that are told: the nearest ones.
 const TOLD_MAX: usize = 256;
 const TOLD_APART_M: f32 = 0.02;
-/// A robot that has not come farther than this for so long stands.
+/// A robot that has not come farther than this for [`STANDS_AFTER_S`] stands.
 const STANDS_WITHIN_M: f64 = 0.03;
 const STANDS_WITHIN_RAD: f64 = 0.05;
 const STANDS_AFTER_S: f64 = 1.0;
-/// What lies so near to the hull can be touched by a turn before a sensor sees it. When it is old it counts as so much farther to the front
-/// and to the side: a reading says to a few centimetres only where in its cone a thing is, and the robot may pass what it may not turn into.
+/// What lies so near to the hull can be touched by a turn before a sensor sees it. When it is old it counts
+/// as so much farther to the front and to the side: a reading says to a few centimetres only where in its
+/// cone a thing is, and the robot may pass what it may not turn into.
 const KEPT_WITHIN_M: f64 = 0.15;
 const OLD_FARTHER_M: f64 = 0.025;
 /// In another frame, or after an unseen journey, places mean nothing.
 const JUMP_M: f64 = 0.5;
 
-/// A reading may have ended at the rim of the sensor's view, half of which has this slope, if it is so near; and one that passes, so far
-/// aside, was not hindered there.
+/// A reading may have ended at the rim of the sensor's view, half of which has this slope, if it is so near;
+/// and one that passes, so far aside, was not hindered there.
 const RIM_SLOPES: [f64; 4] = [-0.22, -0.15, 0.15, 0.22];
 const RIM_WITHIN_M: f64 = 0.6;
 const RIM_SEEN_SLOPE: f64 = 0.19;
 
-/// Ends of readings from which walls are made out: so many, so far apart. Of two that are nearer the mean is taken, with so much weight for
-/// the newer one.
+/// Ends of readings from which walls are made out: so many, so far apart. Of two that are nearer the mean is
+/// taken, with so much weight for the newer one.
 const ENDS_MAX: usize = 160;
 const ENDS_APART_M: f64 = 0.015;
 const ENDS_NEWS: f64 = 0.2;
-/// A reading ends at a wall if so many ends nearby lie on one line with it, within so much of it, over such a length.
+/// A reading ends at a wall if so many ends nearby lie on one line with it, within so much of it, over such a
+/// length.
 const WALL_WITHIN_M: f64 = 0.35;
 const WALL_ENDS: usize = 4;
 const WALL_THICK_M: f64 = 0.015;
 const WALL_LENGTH_M: f64 = 0.12;
 const WALL_SHARE: f64 = 0.6;
-/// A wall beside the robot goes on for so long beyond the end of a reading; one in front of it only beyond the outermost sensors, which
-/// sit so near to the hull's sides. In points so far apart.
+/// A wall beside the robot goes on for so long beyond the end of a reading; one in front of it only beyond
+/// the outermost sensors, which sit so near to the hull's sides. In points so far apart.
 const WALL_GOES_ON_M: f64 = 0.45;
 const CORNER_GOES_ON_M: f64 = 0.25;
 const OUTERMOST_M: f64 = 0.10;
 const WALL_STEP_M: f64 = 0.04;
-/// A wall that is met askew reads too far by up to this, as the sensors' cones see more of what lies farther away.
+/// A wall that is met askew reads too far by up to this, as the sensors' cones see more of what lies farther
+/// away.
 const ASSUMED_NEARER_M: f64 = 0.015;
-/// What was assumed a moment ago still holds: of many readings, each with its error, the one that leaves the least room.
+/// What was assumed a moment ago still holds: of many readings, each with its error, the one that leaves the
+/// least room.
 const ASSUMED_S: f64 = 1.0;
 /// What is assumed does not reach nearer to the hull than this: the robot stands there.
 const ASSUMED_OFF_M: f64 = 0.02;
-/// What is seen beside the robot, or in front by an outermost sensor, nearer than this, and is no wall may reach as far as the corner of the
-/// hull next to the sensor, where no sensor looks, and there be nearer still by this share, but not nearer than so much.
+/// What is seen beside the robot, or in front by an outermost sensor, nearer than this, and is no wall may
+/// reach as far as the corner of the hull next to the sensor, where no sensor looks, and there be nearer
+/// still by this share, but not nearer than so much.
 const BESIDE_M: f64 = 0.25;
 const AHEAD_M: f64 = 0.35;
 const CORNER_SHARE: f64 = 0.5;
@@ -74,11 +80,13 @@ const BEAMS_MAX: usize = 361;
 struct End {
     seen: Time,
     place: Point2<f64>,
-    /// The side out of which it was seen: a wall that is met askew reads too far, so that those of two sides make no line.
+    /// The side out of which it was seen: a wall that is met askew reads too far, so that those of two sides
+    /// make no line.
     side: i8,
     /// From where it was seen.
     eye: Point2<f64>,
-    /// The edge of the hull out of which it was seen: along it a wall goes on, so far back and ahead, where no other sensor looks.
+    /// The edge of the hull out of which it was seen: along it a wall goes on, so far back and ahead, where
+    /// no other sensor looks.
     axis: Vector2<f64>,
     goes_on_m: [f64; 2],
 }
@@ -89,7 +97,8 @@ pub(crate) struct Near {
     sightings: Sightings,
     /// Where the middles of readings have ended.
     ends: Vec<End>,
-    /// Where else a front sensor's reading may have ended, at the rim of its view: when that is narrower it will know.
+    /// Where else a front sensor's reading may have ended, at the rim of its view: when that is narrower it
+    /// will know.
     rims: Sightings,
     /// Walls beyond the ends of what was seen of them.
     assumed: Vec<(Time, Point2<f64>)>,
@@ -208,7 +217,8 @@ impl Near {
         }
     }
 
-    /// What is near, in the frame of a robot that has just moved on; what it was when there is no news of that.
+    /// What is near, in the frame of a robot that has just moved on; what it was when there is no news of
+    /// that.
     pub(crate) fn tell(&mut self, motion: Option<Motion>, hull: &Hull) -> (Option<Pose2>, &[NearPoint]) {
         self.points.clear();
         let Some(here) = motion.map(|motion| motion.pose) else { return (None, &self.points) };
@@ -261,9 +271,9 @@ impl Near {
         Some(here)
     }
 
-    /// What was seen close to the hull is remembered for longer while the robot stands: a leg of a chair at a corner of the hull, where no
-    /// sensor looks, is still there when it drives on. Not for ever: in a narrow door the edge of a cone makes out what is not there, and
-    /// only time takes that away.
+    /// What was seen close to the hull is remembered for longer while the robot stands: a leg of a chair at a
+    /// corner of the hull, where no sensor looks, is still there when it drives on. Not for ever: in a narrow
+    /// door the edge of a cone makes out what is not there, and only time takes that away.
     fn keep_while_it_stands(&mut self, now: Time, here: Pose2, hull: &Hull) {
         let is_near = |there: Pose2| {
             there.distance_m(here) <= STANDS_WITHIN_M
@@ -278,7 +288,8 @@ impl Near {
         }
     }
 
-    /// Walls go on beyond the ends of what was seen of them: a corner of the hull comes there before a sensor does.
+    /// Walls go on beyond the ends of what was seen of them: a corner of the hull comes there before a sensor
+    /// does.
     fn assume(&mut self, here: Pose2, feet: &[End], hull: &Hull) {
         for foot in feet {
             let is_known =
@@ -307,7 +318,8 @@ impl Near {
             let begin = middle + nearer + along * along.dot(&(foot.place - middle));
             let steps = |length_m: f64| (length_m / WALL_STEP_M) as i32;
             let [back_m, ahead_m] = foot.goes_on_m;
-            // Along the hull's side: ahead is where the hull's x axis or, across its front, its y axis points.
+            // Along the hull's side: ahead is where the hull's x axis or, across its front, its y axis
+            // points.
             let sign = along.dot(&foot.axis).signum();
             for step in (-steps(back_m)..=steps(ahead_m)).filter(|step| *step != 0) {
                 self.assumed.push((foot.seen, begin + along * (sign * WALL_STEP_M * f64::from(step))));
@@ -317,8 +329,9 @@ impl Near {
 }
 
 impl Near {
-    /// Between the sensors at a side and those in front nobody looks: a thing that comes into view of one of them may already be at the corner
-    /// between them. So that corner comes no nearer to where it may be, until the thing is known for a wall, or seen past.
+    /// Between the sensors at a side and those in front nobody looks: a thing that comes into view of one of
+    /// them may already be at the corner between them. So that corner comes no nearer to where it may be,
+    /// until the thing is known for a wall, or seen past.
     fn assume_at_corners(&mut self, here: Pose2, foot: &End, hull: &Hull) {
         let range_m = (foot.place - foot.eye).norm();
         let off_m = (CORNER_SHARE * range_m).max(CORNER_LEAST_M);
@@ -351,7 +364,8 @@ fn is_sure(pose: &PoseEstimate) -> bool {
         && (0.0..=SURE_RAD * SURE_RAD).contains(&pose.covariance[8])
 }
 
-/// The middle and the direction of the line through a place on which most of the points lie, if enough of them do.
+/// The middle and the direction of the line through a place on which most of the points lie, if enough of
+/// them do.
 fn line_through(place: Point2<f64>, points: &[Point2<f64>]) -> Option<(Point2<f64>, Vector2<f64>)> {
     let on = |middle: Point2<f64>, along: Vector2<f64>| {
         let across = Vector2::new(-along.y, along.x);

@@ -20,7 +20,8 @@ pub enum Sensor {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
-    /// World file whose walls count as near while the pose is known; empty for none. The signal does not depend on it.
+    /// World file whose walls count as near while the pose is known; empty for none. The signal does not
+    /// depend on it.
     #[schemars(extend("format" = "path"))]
     pub world: String,
     /// Which sensor is watched: "tof" or "laser".
@@ -34,37 +35,39 @@ pub struct Params {
     /// A reading on the left below this is a STOP (COF-064).
     #[schemars(range(min = 0.0, max = 4.0))]
     pub left_radius_m: f64,
-    /// Readings older than this are none: STOP (COF-069). Three frames of the sensor: one may be late and one be lost. The longer it is,
-    /// the slower `base-driver` lets the robot drive.
+    /// Readings older than this are not used: STOP (COF-069). Three frames of the sensor: one may be late and
+    /// one be lost. The longer it is, the slower `base-driver` lets the robot drive.
     #[schemars(range(min = 10, max = 5000))]
     pub max_age_ms: u64,
-    /// Sensors that tell nothing but "too little light" or "too much scatter" for longer than this see nothing at all: STOP for their
-    /// face, unless half of its sensors are better off.
+    /// Sensors that tell nothing but "too little light" or "too much scatter" for longer than this see
+    /// nothing at all: STOP for their face, unless half of its sensors are better off.
     #[schemars(range(min = 50, max = 60000))]
     pub scatter_max_ms: u64,
-    /// A sensor that sees nothing while the robot drives so far past what its neighbour sees is blind; and readings that do not change in
-    /// the least on such a way are old ones: STOP. 0 does not look.
+    /// A sensor that sees nothing while the robot drives this far past what its neighbour sees is blind, and
+    /// readings that do not change in the least over this distance are old ones: STOP. 0 switches this check
+    /// off.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub blind_way_m: f64,
     /// The clearance is published at least this often, so that silence is noticed quickly.
     #[schemars(range(min = 5, max = 1000))]
     pub heartbeat_ms: u64,
-    /// So many clear readings in a row of every sensor turn STOP into GO (COF-070).
+    /// Clear readings in a row of every sensor that turn STOP into GO (COF-070).
     #[schemars(range(min = 1, max = 100))]
     pub clear_frames: u32,
     /// The paper's rule to the letter: one clear frame turns STOP into GO, and nothing is remembered.
     pub strict_paper: bool,
-    /// A front reading below this that rises suddenly is remembered as an obstacle; 0 remembers nothing.
+    /// A front reading below this that rises suddenly is remembered as an obstacle; 0 remembers
+    /// nothing.
     #[schemars(range(min = 0.0, max = 4.0))]
     pub memory_m: f64,
-    /// A rise above what the robot's own motion explains by more than this, from one reading to the next, is sudden: faster than a
-    /// person walks away.
+    /// A rise above what the robot's own motion explains by more than this, from one reading to the next, is
+    /// sudden: faster than a person walks away.
     #[schemars(range(min = 0.02, max = 2.0))]
     pub memory_jump_m: f64,
-    /// A remembered obstacle is forgotten after so long with clear readings and no forward motion.
+    /// A remembered obstacle is forgotten after this long with clear readings and no forward motion.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub memory_release_s: f64,
-    /// Speeds up to this are no forward motion.
+    /// Speeds up to this do not count as forward motion.
     #[schemars(range(min = 0.0, max = 0.2))]
     pub standstill_mps: f64,
     /// From the robot's centre to its front edge (COF-003).
@@ -76,7 +79,8 @@ pub struct Params {
     /// Half of the robot's width (COF-003).
     #[schemars(range(min = 0.01, max = 5.0))]
     pub hull_side_m: f64,
-    /// A laser's face reaches beyond the body's edges by this; what lies diagonally beyond belongs to no face.
+    /// A laser's face reaches beyond the body's edges by this; what lies diagonally beyond belongs to no
+    /// face.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub laser_margin_m: f64,
 }

@@ -109,7 +109,8 @@ fn a_radius_of_100_mm_everywhere_never_starts_beside_the_wall() {
     check_steady(Params::default(), beside_the_wall, Verdict::Go);
 }
 
-/// COF-065 and note 2.5: at 0.36 m/s, 0.5 m/s² and frames of 0.1 s a robot stops within 200 mm, and not within 50 mm.
+/// COF-065 and note 2.5: at 0.36 m/s, 0.5 m/s² and frames of 0.1 s a robot stops within 200 mm, and not
+/// within 50 mm.
 #[test]
 fn a_radius_of_50_mm_everywhere_hits_the_obstacle() {
     let gap_left_m = |params: Params| {
@@ -279,8 +280,8 @@ fn one_silent_sensor_is_a_stop() {
     bench.expect(Verdict::Stop, Why::Stale);
 }
 
-/// Fig. 4: the centre falls, and rises at point 21, where the shelf drops out of view; the left one sees a bar from point 11; the
-/// right one sees the other end of the hallway, noisily.
+/// Fig. 4: the centre falls, and rises at point 21, where the shelf drops out of view; the left one sees a
+/// bar from point 11; the right one sees the other end of the hallway, noisily.
 fn mail_cart(point: usize) -> TofRanges {
     let noise = [1.9, FAR, 2.7, 1.4, FAR, 3.3][point % 6];
     let centre = if point < 21 { 1.02 - 0.045 * point as f32 } else { 1.7 };
@@ -288,7 +289,8 @@ fn mail_cart(point: usize) -> TofRanges {
     ahead([noise, noise, centre, left])
 }
 
-/// Points at which the signal is GO, when the robot drives on whatever the guard says (as in the paper's experiment).
+/// Points at which the signal is GO, when the robot drives on whatever the guard says (as in the paper's
+/// experiment).
 fn goes(
     params: Params,
     scene: impl Fn(usize) -> TofRanges,
@@ -308,7 +310,8 @@ fn goes(
 
 #[test]
 fn the_mail_cart_of_fig_4_stays_an_obstacle_after_point_21() {
-    // The centre reads 0.165 m at point 19: stop. Only the strict rule falls for the rise at point 21, once the bar is out of sight.
+    // The centre reads 0.165 m at point 19: stop. Only the strict rule falls for the rise at point 21, once
+    // the bar is out of sight.
     let shelf_only = |point| {
         let TofRanges { mut range_m, mut status } = mail_cart(point);
         (range_m[5], status[5]) = (0.0, NO_TARGET);
@@ -405,7 +408,8 @@ fn turning_away_leaves_the_obstacle_aside() {
     assert!((bench.said.front_m - 0.3).abs() < 1e-5);
 }
 
-/// Fig. 5: the right wall is steady; sensor 2 is noisy until it sees the seat's fabric; sensor 4 sees the pole and past it in turn.
+/// Fig. 5: the right wall is steady; sensor 2 is noisy until it sees the seat's fabric; sensor 4 sees the
+/// pole and past it in turn.
 #[test]
 fn the_pole_of_fig_5_holds_the_stop_though_it_flickers() {
     let chair = |point: usize| {
@@ -432,8 +436,8 @@ fn the_sofa_of_fig_6_stops_the_robot_once() {
     assert_eq!(goes(Params::default(), sofa, 50, true), (3..=47).collect::<Vec<_>>());
 }
 
-/// A robot that drives at 0.3 m/s towards a body in a 1.7 m wide hallway, seen through the true cones: the gap at which it halts, and
-/// how often the signal changed in the two seconds that it then stands there.
+/// A robot that drives at 0.3 m/s towards a body in a 1.7 m wide hallway, seen through the true cones: the
+/// gap at which it halts, and how often the signal changed in the two seconds that it then stands there.
 fn approach(body: geometry::Body, y_m: f64) -> (f64, u64) {
     let walls = [-0.85, 0.85].map(|y| Segment::between([-5.0, y], [20.0, y]));
     let mut scene = Scene::new(walls);

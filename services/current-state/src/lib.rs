@@ -1,9 +1,10 @@
-//! Gathers what the other services say into one message that always holds the newest of everything: place, orientation, floor, angle
-//! from the hallway's straight line, move instructions and delivery status. Source: the coffee robot's paper, section IV (COF-047,
-//! COF-048).
+//! Gathers what the other services say into one message that always holds the newest of everything: place,
+//! orientation, floor, angle from the hallway's straight line, move instructions and delivery status. Source:
+//! the coffee robot's paper, section IV (COF-047, COF-048).
 //!
-//! Nothing is computed here and nothing is passed on unchecked: a number that is none keeps the last one that was, an unknown state
-//! becomes the careful one (`Halt`, `Fault`, `Stop`), and every part says how old it is.
+//! Nothing is computed here and nothing is passed on unchecked: in place of an invalid number the last valid
+//! one is kept, an unknown state becomes the careful one (`Halt`, `Fault`, `Stop`), and every part says how
+//! old it is.
 
 mod params;
 #[cfg(test)]

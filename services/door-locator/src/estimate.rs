@@ -5,8 +5,9 @@ use crate::profile::{Edge, End};
 /// Standard deviation of an edge's place beside the distance between two readings: odometry and heading.
 const PLACE_SIGMA_M: f64 = 0.010;
 
-/// How far beyond a sensor's axis its cone still sees the wall, as a share of the wall's distance. A cone shows the nearest thing in
-/// it, so it leaves the wall late at a door's near end and is back at the wall early at the far end.
+/// How far beyond a sensor's axis its cone still sees the wall, as a share of the wall's distance. A cone
+/// shows the nearest thing in it, so it leaves the wall late at a door's near end and is back at the wall
+/// early at the far end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lag {
     pub(crate) ratio: f64,
@@ -49,8 +50,9 @@ impl Edges {
         self.seen.iter().any(|ends| ends.iter().all(Option::is_some))
     }
 
-    /// The weighted least squares of centre c and lag ratio r. An edge at `a` says `a + w/2 = c + r d` at the near end and
-    /// `a - w/2 = c - r d` at the far end, where w is the door's width and d the wall's distance; `lag` is what was known of r.
+    /// The weighted least squares of centre c and lag ratio r. An edge at `a` says `a + w/2 = c + r d` at the
+    /// near end and `a - w/2 = c - r d` at the far end, where w is the door's width and d the wall's
+    /// distance; `lag` is what was known of r.
     pub(crate) fn centre(&self, width_m: f64, lag: Lag) -> Option<Centre> {
         let prior = 1.0 / (lag.sigma_ratio * lag.sigma_ratio);
         let (mut cc, mut cr, mut rr) = (0.0, 0.0, prior);

@@ -1,4 +1,5 @@
-//! Where the robot is along the hallway: odometry, turned into the hallway's direction by the localiser's heading.
+//! Where the robot is along the hallway: odometry, turned into the hallway's direction by the localiser's
+//! heading.
 
 use crate::doors::{Door, hallway_rad};
 use geometry::{Pose2, angle};
@@ -44,7 +45,8 @@ pub(crate) struct Station {
 }
 
 impl Hallway {
-    /// `None` while the direction is unknown. The flag says that the counting has begun anew: what was counted before is void.
+    /// `None` while the direction is unknown. The flag says that the counting has begun anew: what was
+    /// counted before is void.
     pub(crate) fn follow(
         &mut self,
         taken: Time,

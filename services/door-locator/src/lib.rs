@@ -1,15 +1,19 @@
-//! Finds the door beside the robot, and how far ahead its centre line is: a door reads about 100 mm deeper than the wall. Source: the
-//! coffee robot's paper, sections III.C, IV.C and V.C (COF-100 to COF-112), with the gaps settled in X-25 (side and gate by the map)
-//! and X-26 (window by speed), and the detector of note 2.6.
+//! Finds the door beside the robot, and how far ahead its centre line is: a door reads about 100 mm deeper
+//! than the wall. Source: the coffee robot's paper, sections III.C, IV.C and V.C (COF-100 to COF-112), with
+//! the gaps settled in X-25 (side and gate by the map) and X-26 (window by speed), and the detector of note
+//! 2.6.
 //!
-//! Two detectors look at the same readings. The paper's sliding window fires when the robot is at the door or almost past it
-//! (COF-104, COF-111). The finer one locates the door's edges along the wall, by odometry, for each sensor of the side: wall, then
-//! three readings or more that are deeper. Each edge says where the centre line is, and all of them together say it best: while the
-//! robot approaches the centre, the near edge of the front sensor, and 277 mm later that of the back sensor, which confirms the door;
-//! after it, the far edges as well. A sensor's cone leaves the wall late and is back early; by how much is learnt from doors passed.
+//! Two detectors look at the same readings. The paper's sliding window fires when the robot is at the door or
+//! almost past it (COF-104, COF-111). The finer one locates the door's edges along the wall, by odometry, for
+//! each sensor of the side: wall, then three readings or more that are deeper. Each edge says where the
+//! centre line is, and all of them together say it best: while the robot approaches the centre, the near edge
+//! of the front sensor, and 277 mm later that of the back sensor, which confirms the door; after it, the far
+//! edges as well. A sensor's cone leaves the wall late and is back early; by how much is learnt from doors
+//! passed.
 //!
-//! A sighting is published with every frame from the first edge on until the door is `gate_m` behind. Its `confidence` is 0.5 with
-//! one sensor, 0.8 confirmed by the second, 0.95 when a sensor has seen both ends, and 0 when the second contradicts: no door.
+//! A sighting is published with every frame from the first edge on until the door is `gate_m` behind. Its
+//! `confidence` is 0.5 with one sensor, 0.8 confirmed by the second, 0.95 when a sensor has seen both ends,
+//! and 0 when the second contradicts: no door.
 
 mod doors;
 mod estimate;
@@ -110,7 +114,7 @@ impl DoorLocator {
         Self::with_world(params, &world)
     }
 
-    /// The same with a world that is there already.
+    /// A locator in a world that is read already.
     ///
     /// # Errors
     /// When the parameters make no sense.
@@ -215,7 +219,8 @@ impl DoorLocator {
         self.judge(index, fired, station, target)
     }
 
-    /// Which door an edge belongs to: the one that is seen already, or that of the map which lies nearest to where its centre would be.
+    /// Which door an edge belongs to: the one that is seen already, or that of the map which lies nearest to
+    /// where its centre would be.
     fn take_edge(&mut self, index: usize, lane: usize, edge: Edge, station: &Station, place: Option<Pose2>) {
         let flank = &mut self.flanks[index];
         let centre_m = |door: &Door| {

@@ -13,7 +13,8 @@ pub struct Params {
     /// The world file with the doors; without one no door is ever found.
     #[schemars(extend("format" = "path"))]
     pub world: String,
-    /// Only the paper's sliding window decides; otherwise the edges of the door are located as well, which is earlier and finer.
+    /// Only the paper's sliding window decides; otherwise the edges of the door are located as well, which is
+    /// earlier and finer.
     pub strict_paper: bool,
     /// By how much the newer half of the window must be deeper than the older one (COF-104).
     #[schemars(range(min = 0.005, max = 1.0))]
@@ -21,10 +22,10 @@ pub struct Params {
     /// A window that has fired fires again only after its newer half fell by this (note 2.6).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub unlock_m: f64,
-    /// Half of the window holds at least so many readings.
+    /// The fewest readings in half of the window.
     #[schemars(range(min = 1, max = 64))]
     pub half_window_min: u32,
-    /// Half of the window holds at most so many readings, however slow the robot is.
+    /// The most readings in half of the window, however slow the robot is.
     #[schemars(range(min = 1, max = 1024))]
     pub half_window_max: u32,
     /// Readings above this are noise (COF-030).
@@ -39,20 +40,21 @@ pub struct Params {
     /// A closed door is deeper than the wall by what the map says, give or take this.
     #[schemars(range(min = 0.01, max = 0.5))]
     pub recess_tolerance_m: f64,
-    /// So many readings in a row make an edge; one or two deviating points make none (COF-106).
+    /// Readings in a row that make an edge; one or two deviating points do not (COF-106).
     #[schemars(range(min = 3, max = 20))]
     pub edge_readings: u32,
-    /// An edge is one only when the readings behind it reach at least this far along the wall.
+    /// An edge counts only when the readings behind it reach at least this far along the wall.
     #[schemars(range(min = 0.0, max = 0.4))]
     pub edge_run_m: f64,
-    /// How much later than its axis a sensor's cone leaves the wall, in metres for each metre of wall distance: the tangent of half
-    /// the cone, or less. A first guess, improved with each door passed.
+    /// How much later than its axis a sensor's cone leaves the wall, in metres for each metre of wall
+    /// distance: the tangent of half the cone, or less. A first guess, improved with each door passed.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub edge_lag_ratio: f64,
-    /// Standard deviation of that guess.
+    /// Standard deviation of the first guess of `edge_lag_ratio`.
     #[schemars(range(min = 0.001, max = 0.5))]
     pub edge_lag_sigma_ratio: f64,
-    /// The second sensor sees the same edge after the sensors' distance, give or take this share of it (note 2.6).
+    /// The second sensor sees the same edge after the sensors' distance, give or take this share of it (note
+    /// 2.6).
     #[schemars(range(min = 0.05, max = 1.0))]
     pub confirm_share: f64,
     /// The robot stands at the entrance when the door's centre line is within this.
@@ -61,10 +63,10 @@ pub struct Params {
     /// Below this speed the robot stands, and readings are no new points of the wall.
     #[schemars(range(min = 0.001, max = 0.2))]
     pub standstill_mps: f64,
-    /// Readings and odometry older than this are none.
+    /// Readings and odometry older than this are not used.
     #[schemars(range(min = 10, max = 5000))]
     pub max_age_ms: u64,
-    /// A pose older than this is none.
+    /// A pose older than this is not used.
     #[schemars(range(min = 10, max = 10_000))]
     pub location_max_age_ms: u64,
 }

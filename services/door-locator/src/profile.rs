@@ -3,7 +3,7 @@
 use crate::Params;
 use std::collections::VecDeque;
 
-/// The wall's distance is the median of so many readings at most.
+/// The most readings of which the wall's distance is the median.
 const WALL_READINGS: usize = 15;
 
 /// Readings closer together than this along the wall are the same point of it.
@@ -12,7 +12,7 @@ const SAME_POINT_M: f64 = 0.004;
 /// Something deeper than the wall for longer than this is no door but another wall.
 const LONGEST_M: f64 = 2.5;
 
-/// Of what is passed, at most so many readings are kept.
+/// The most readings that are kept of what is passed.
 const MOST_READINGS: usize = 1024;
 
 /// Which end of a door an edge is, in the direction in which the hallway is counted.
@@ -90,7 +90,8 @@ impl Profile {
         Some(2 * run.noisy >= run.len() || spread_m(&run.readings_m) > 0.040)
     }
 
-    /// Takes in a reading (`None`: noise or nothing in range) of the wall's point at `at_m` along the hallway.
+    /// Takes in a reading (`None`: noise or nothing in range) of the wall's point at `at_m` along the
+    /// hallway.
     pub(crate) fn take(&mut self, at_m: f64, reading_m: Option<f64>, params: &Params) -> Option<Edge> {
         let before_m = self.last_m.unwrap_or(at_m);
         if self.last_m.is_some() && (at_m - before_m).abs() < SAME_POINT_M {
@@ -176,7 +177,8 @@ impl Profile {
                 run.readings_m.iter().for_each(|&m| self.add_wall(Some(m)));
                 Some(found)
             }
-            // What was taken for the wall was a door, or something stands before the wall. Either way this is the wall now.
+            // What was taken for the wall was a door, or something stands before the wall. Either way this is
+            // the wall now.
             Kind::Raised => {
                 let was_door = self.inside.is_none();
                 let found = edge(false, level_m, wall_m - level_m);

@@ -6,8 +6,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 
-/// A hallway 1.7 m wide: 207 on the right at 10 m, 208 on the right at 13 m, 209 on the left at 16 m, nothing on the map after 18 m
-/// though a recess is there, and an elevator at 25 m.
+/// A hallway 1.7 m wide: 207 on the right at 10 m, 208 on the right at 13 m, 209 on the left at 16 m, nothing
+/// on the map after 18 m though a recess is there, and an elevator at 25 m.
 const WORLD: &str = r#"
 name = "five doors"
 [[floor]]
@@ -203,7 +203,8 @@ fn two_doors_in_a_row_fire_twice() {
     assert_eq!(fires(4, &row), [11, 20]);
 }
 
-/// COF-108: at high speed the rise is one to two points and needs a small window; at low speed it needs a large one.
+/// COF-108: at high speed the rise is one to two points and needs a small window; at low speed it needs a
+/// large one.
 #[test]
 fn the_window_must_fit_the_speed() {
     assert_eq!(fires(2, &after_wall(4, &[400.0, 400.0, 300.0, 300.0])), [5]);
@@ -242,8 +243,8 @@ fn faster_is_a_smaller_window() {
 
 // ---- Passes.
 
-/// Errors of `offset_m` in metres over a set of passes: at the first sighting, when the centre is truly beside, and when both ends of
-/// the door have been seen.
+/// Errors of `offset_m` in metres over a set of passes: at the first sighting, when the centre is truly
+/// beside, and when both ends of the door have been seen.
 #[derive(Debug, Default)]
 struct Errors {
     first: Vec<f64>,
@@ -313,7 +314,8 @@ fn fast_passes_find_the_centre_line() {
     check_errors("fast, 0.25 s", &fast(&[0.25]), 0.080, 0.200, 0.060);
 }
 
-/// The first door teaches how late the cone leaves the wall, so the second is found better before its far edge.
+/// The first door teaches how late the cone leaves the wall, so the second is found better before its far
+/// edge.
 #[test]
 fn doors_passed_teach_the_cones_lag() {
     let pass = Pass { to_m: 13.0, half_cone_deg: 2.0, across_m: -0.15, from_m: 8.0, ..Pass::default() };

@@ -1,4 +1,5 @@
-//! The paper's detector: a sliding window whose newer half is compared with its older half (COF-102 to COF-112, note 2.6).
+//! The paper's detector: a sliding window whose newer half is compared with its older half (COF-102 to
+//! COF-112, note 2.6).
 
 use crate::Params;
 use std::collections::VecDeque;
@@ -14,8 +15,8 @@ pub(crate) struct Window {
 }
 
 impl Window {
-    /// Takes in a reading (`None`: nothing in range) with halves of `half` readings, and says whether the door begins to be beside
-    /// the robot with this one.
+    /// Takes in a reading (`None`: nothing in range) with halves of `half` readings, and says whether the
+    /// door begins to be beside the robot with this one.
     pub(crate) fn take(&mut self, reading_m: Option<f64>, half: usize, params: &Params) -> bool {
         let last_valid_m = self.readings.back().map(|&(m, _)| m);
         match reading_m.filter(|&m| m <= params.noise_m) {

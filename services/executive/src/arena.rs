@@ -66,7 +66,8 @@ impl Arena {
         self.room_up_to_m(pose, f64::INFINITY)
     }
 
-    /// The same, but no more than `enough_m`: walls that are farther away need not be looked at closely.
+    /// Room around the body at a pose, but no more than `enough_m`: walls that are farther away need not be
+    /// looked at closely.
     pub(crate) fn room_up_to_m(&self, pose: Pose2, enough_m: f64) -> f64 {
         let (centre, reach_m) = (pose.position(), self.footprint.radius_m());
         let mut placed: Option<Polygon> = None;
@@ -95,7 +96,8 @@ impl Arena {
         self.least_room_m((0..=steps).map(|step| pose.compose(Pose2::new(at(step), 0.0, 0.0))))
     }
 
-    /// The least room at any of these poses. What the body is leaving does not count: it is there, however near a wall seems to be.
+    /// The least room at any of these poses. What the body is leaving does not count: it is there, however
+    /// near a wall seems to be.
     fn least_room_m(&self, poses: impl Iterator<Item = Pose2>) -> f64 {
         let (mut least_m, mut last_m, mut is_leaving) = (f64::INFINITY, None, true);
         for pose in poses {
@@ -124,7 +126,8 @@ impl Arena {
         self.walls().distance_m(place)
     }
 
-    /// A place near this one, at most `shift_m` away, that is `clearance_m` from the walls, or as far as it gets.
+    /// A place near this one, at most `shift_m` away, that is `clearance_m` from the walls, or as far as it
+    /// gets.
     pub(crate) fn shifted(&self, place: Point2<f64>, clearance_m: f64, shift_m: f64) -> Point2<f64> {
         let around = (1..=4).flat_map(|ring| {
             (0..16).map(move |step| {

@@ -165,8 +165,9 @@ impl Executive {
         true
     }
 
-    /// Turns to the nearest wall, then measures (NXT-040). Where the body has no room for that turn, a smaller one brings another window in
-    /// front of the wall; where there is none for that either, the windows are turned.
+    /// Turns to the nearest wall, then measures (NXT-040). Where the body has no room for that turn, a
+    /// smaller one brings another window in front of the wall; where there is none for that either, the
+    /// windows are turned.
     fn align(&mut self, now: Time, nearest: Option<(f64, f64)>) -> bool {
         let Some((bearing_rad, range_m)) = nearest else { return self.measure(now, 0.0) };
         if !self.params.turn_to_wall || bearing_rad.abs() < NO_TURN_RAD {
@@ -407,7 +408,8 @@ impl Executive {
         }
     }
 
-    /// What the robot knows of its surroundings: the map where its place is certain, or is one of a few; else the last scan.
+    /// What the robot knows of its surroundings: the map where its place is certain, or is one of a few; else
+    /// the last scan.
     fn views(&self) -> Vec<View<'_>> {
         if let Some(belief) = self.place() {
             return vec![View { arena: &self.arena, pose: belief.pose }];
@@ -450,8 +452,8 @@ impl Executive {
         }
     }
 
-    /// How far the body may drive before the error of its pose could bring it too near to a wall. What is so near already does not count
-    /// until the body comes nearer.
+    /// How far the body may drive before the error of its pose could bring it too near to a wall. What is so
+    /// near already does not count until the body comes nearer.
     fn certain_way_m(&self, belief: &Belief, way_m: f64) -> f64 {
         let front_m = 0.5 * self.params.body_length_m;
         let spare_m = |at_m: f64| {

@@ -1,5 +1,6 @@
-//! Sends the ultrasonic robot to its target: scan, turn to the nearest wall, scan again, localise, plan, drive, and localise once more
-//! (NXT-095, Fig. 8). It is the layer between planner and controller that decides what comes next (an executive, after Gat 1998).
+//! Sends the ultrasonic robot to its target: scan, turn to the nearest wall, scan again, localise, plan,
+//! drive, and localise once more (NXT-095, Fig. 8). It is the layer between planner and controller that
+//! decides what comes next (an executive, after Gat 1998).
 
 mod arena;
 mod flow;
@@ -120,7 +121,7 @@ impl Executive {
         Self::in_world(params, &world, seed)
     }
 
-    /// The same in a world that is at hand already; `params.world` only names it.
+    /// An executive in a world that is at hand already; `params.world` only names it.
     ///
     /// # Errors
     /// When the parameters make no sense, or the world has no target.
@@ -267,5 +268,5 @@ impl Executive {
 
 /// Clusters with a larger share of the weight are places that look alike.
 const ALIKE_SHARE: f64 = 0.05;
-/// No more decisions than this are taken in one step.
+/// The most decisions that are taken in one step.
 const MOST_AT_ONCE: usize = 8;

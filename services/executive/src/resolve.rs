@@ -1,7 +1,9 @@
-//! Where to drive when several places look alike: active localisation (after Fox et al. 1998) on a small random roadmap.
+//! Where to drive when several places look alike: active localisation (after Fox et al. 1998) on a small
+//! random roadmap.
 //!
-//! Wherever the robot is, it is at one of a few poses. A way is described as seen from the robot, and must be free at nearly all of them; it
-//! is the better, the more the scans at its end would differ from pose to pose, and the shorter it is (note 1.6 step 6).
+//! Wherever the robot is, it is at one of a few poses. A way is described as seen from the robot, and must be
+//! free at nearly all of them; it is the better, the more the scans at its end would differ from pose to
+//! pose, and the shorter it is (note 1.6 step 6).
 
 use crate::arena::Arena;
 use geometry::{Point2, Pose2};
@@ -44,11 +46,12 @@ const COST_PER_TURN: f64 = 0.03;
 pub(crate) struct Places {
     /// The places that a cloud of particles holds, the likeliest first.
     pub(crate) hypotheses: Vec<Hypothesis>,
-    /// Whether these are all: a few places, each of which is certain to so much, as a standard deviation.
+    /// The standard deviation to which each of the places is certain, if these few are all.
     pub(crate) sigma_m: Option<f64>,
 }
 
-/// Clusters are all that there is when they hold so much of the weight, and none is wider.
+/// The clusters are all that there is when they hold this share of the weight, and none is wider than
+/// [`WIDE_M`] or [`WIDE_RAD`].
 const ALL_SHARE: f64 = 0.98;
 const WIDE_M: f64 = 0.03;
 const WIDE_RAD: f64 = 0.15;
@@ -182,8 +185,8 @@ pub(crate) fn way(arena: &Arena, places: &Places, rng: &mut impl Rng) -> Vec<Poi
     way
 }
 
-/// How much the readings of the four windows at a place differ from pose to pose: the sum, over the windows, of the readings' variance in
-/// relation to that of their noise, each at most 1.
+/// How much the readings of the four windows at a place differ from pose to pose: the sum, over the windows,
+/// of the readings' variance in relation to that of their noise, each at most 1.
 fn difference(arena: &Arena, hypotheses: &[Hypothesis], total: f64, seen: Point2<f64>) -> f64 {
     let Some(first) = hypotheses.first() else { return 0.0 };
     let place = first.pose.transform(seen);

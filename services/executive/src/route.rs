@@ -1,8 +1,10 @@
-//! How the body gets to a place by turns and straight ways without touching a wall: A* over its poses, each of which is tried with a turn
-//! and a straight way to the end (the analytic expansion of Dolgov et al. 2008).
+//! How the body gets to a place by turns and straight ways without touching a wall: A* over its poses, each
+//! of which is tried with a turn and a straight way to the end (the analytic expansion of Dolgov et al.
+//! 2008).
 //!
-//! The body is a box that is longer than wide: where it can drive along a wall it cannot always turn. All that is known of the
-//! surroundings counts: where several places look alike, a way must be free at each of them.
+//! The body is a box that is longer than wide: where it can drive along a wall it cannot always turn. All
+//! that is known of the surroundings counts: where several places look alike, a way must be free at each of
+//! them.
 
 use crate::arena::Arena;
 use geometry::{Point2, Pose2, angle};
@@ -29,7 +31,7 @@ pub(crate) enum Leg {
 /// Turns and ways are looked at in steps of these.
 const SWEEP_RAD: f64 = 0.07;
 const SWEEP_M: f64 = 0.02;
-/// The search turns by this, and drives so far.
+/// The search turns by this, and drives this far.
 const TURN_RAD: f64 = PI / 12.0;
 const MOVES_M: [f64; 4] = [0.02, -0.02, 0.06, -0.06];
 /// Poses nearer to each other are one.
@@ -37,19 +39,19 @@ const SAME_M: f64 = 0.01;
 /// Metres that a radian of turning is worth, and a leg more: each has errors of its own.
 const COST_PER_RAD: f64 = 0.04;
 const COST_PER_LEG: f64 = 0.03;
-/// A metre back is worth so many ahead: nobody looks there.
+/// How many metres ahead a metre back costs: no sensor looks there.
 const COST_BACK: f64 = 1.5;
-/// A step without any room is worth so many with all that is wanted.
+/// How many steps with all the room that is wanted a step without any costs.
 const COST_NARROW: f64 = 30.0;
-/// Less room is none, but for a body that leaves a wall.
+/// The least room of a route; only a body that leaves a wall may have less.
 const NO_ROOM_M: f64 = 0.004;
 /// Room that grows by more from step to step is that of a body that leaves a wall.
 const LEAVING_M: f64 = 1e-4;
-/// The search ends after so many poses.
+/// The most poses that the search looks at.
 const MOST_POSES: usize = 2500;
 /// What is left of the way counts for more than it is, which finds a good route sooner than the best one.
 const EAGERNESS: f64 = 1.5;
-/// Turns that are smaller are none.
+/// Turns smaller than this are left out.
 const NO_TURN_RAD: f64 = 0.004;
 
 /// A pose of the search, as seen from where the robot is.
@@ -85,7 +87,8 @@ impl PartialOrd for Entry {
     }
 }
 
-/// Room around the body at a pose as seen from the robot, in all views; more than `enough_m` need not be told apart.
+/// Room around the body at a pose as seen from the robot, in all views; more than `enough_m` need not be told
+/// apart.
 fn room_m(views: &[View<'_>], seen: Pose2, enough_m: f64) -> f64 {
     let room_m = |view: &View<'_>| view.arena.room_up_to_m(view.pose.compose(seen), enough_m);
     views.iter().map(room_m).fold(f64::INFINITY, f64::min)
@@ -100,7 +103,8 @@ pub(crate) enum Route {
     Away(Vec<Leg>),
 }
 
-/// The legs to a place, given as seen from the robot, with `wanted_m` of room around the body where that is to be had.
+/// The legs to a place, given as seen from the robot, with `wanted_m` of room around the body where that is
+/// to be had.
 pub(crate) fn route(views: &[View<'_>], wanted_m: f64, place: Point2<f64>) -> Route {
     let start = Node {
         pose: Pose2::IDENTITY,
@@ -137,7 +141,8 @@ pub(crate) fn route(views: &[View<'_>], wanted_m: f64, place: Point2<f64>) -> Ro
     Route::Away(search.legs(roomiest))
 }
 
-/// Poses with the same key are one to the search. How a pose was reached counts: turning on is cheaper than beginning to turn.
+/// Poses with the same key are one to the search. How a pose was reached counts: turning on is cheaper than
+/// beginning to turn.
 fn key(node: &Node) -> (i32, i32, i32, bool) {
     let cell = |metres: f64| (metres / SAME_M).round() as i32;
     let direction = (node.pose.heading_rad.rem_euclid(TAU) / TURN_RAD).round() as i32;

@@ -1,7 +1,8 @@
 //! Obstacle distances in the three cones of the avoidance controller, from whatever sensors there are.
 //!
-//! Left 30 to 50 degrees, front -30 to 30, right -50 to -30 (ASN-143), as clearances from the hull. What lies beside the
-//! cones, from 50 to 110 degrees, counts for left and right with a stretched clearance (X-38, note 3.7).
+//! Left 30 to 50 degrees, front -30 to 30, right -50 to -30 (ASN-143), as clearances from the hull.
+//! What lies beside the cones, from 50 to 110 degrees, counts for left and right with a stretched clearance
+//! (X-38, note 3.7).
 
 use crate::params::Params;
 use messages::{RangeScan, Reading, Time, TofRanges};
@@ -70,8 +71,8 @@ pub(crate) struct TofMemory {
 }
 
 impl TofMemory {
-    /// From the eight sensors of the coffee robot, which sit on the edges of its hull. `None` if a sensor is faulty, or
-    /// silent for longer than inputs may be old.
+    /// From the eight sensors of the coffee robot, which sit on the edges of its hull. `None` if a sensor is
+    /// faulty, or silent for longer than inputs may be old.
     pub(crate) fn clearances(
         &mut self,
         now: Time,

@@ -7,7 +7,8 @@ use nalgebra::{Point2, Vector2};
 
 /// A corner this near can be passed by lying behind the robot, not only by nearness.
 const PASSED_WITHIN_M: f64 = 1.0;
-/// How far beyond a straight corner, and beyond a right angle, the motion controller may look: so it slows down for turns.
+/// How far beyond a straight corner, and beyond a right angle, the motion controller may look: so it slows
+/// down for turns.
 const SLACK_STRAIGHT_M: f64 = 2.5;
 const SLACK_RIGHT_ANGLE_M: f64 = 0.35;
 
@@ -24,7 +25,8 @@ pub(crate) struct Course {
 pub(crate) struct Aim {
     /// Where to drive now.
     pub(crate) point: Point2<f64>,
-    /// Distance to that place, or to the corner just passed if that is nearer: how close a point to turn at is.
+    /// Distance to that place, or to the corner just passed if that is nearer: how close a point to turn at
+    /// is.
     pub(crate) close_m: f64,
     /// Along the path to the goal, shortened where a sharp corner comes first.
     pub(crate) way_m: f64,
@@ -35,7 +37,8 @@ pub(crate) struct Aim {
 }
 
 impl Course {
-    /// Where to drive from `pose` on the path `(request, revision)`. `None` without waypoints or with nonsense among them.
+    /// Where to drive from `pose` on the path `(request, revision)`. `None` without waypoints or with
+    /// nonsense among them.
     pub(crate) fn aim(
         &mut self,
         path: (u64, u64),

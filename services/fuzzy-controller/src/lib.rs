@@ -1,8 +1,10 @@
-//! Drives to waypoints and around obstacles by fuzzy rules: the paper's FLMC with its three controllers MM, OAM and CSM
-//! (ASN-140 to ASN-149, note 3.6 to 3.8), whose rules are FCL files. The engine that runs them is in [`fuzzy`].
+//! Drives to waypoints and around obstacles by fuzzy rules: the paper's FLMC with its three controllers MM,
+//! OAM and CSM (ASN-140 to ASN-149, note 3.6 to 3.8), whose rules are FCL files. The engine that runs them is
+//! in [`fuzzy`].
 //!
-//! Who decides, first to last: bad or stale input stops; something close ahead brakes, and then the robot only turns; something near
-//! is avoided; a close target to the side is turned to; else the robot drives to it.
+//! Who decides, first to last: bad or stale input stops; something close ahead brakes, and then the robot
+//! only turns; something near is avoided; a close target to the side is turned to; else the robot drives to
+//! it.
 
 mod clearance;
 mod controllers;
@@ -432,7 +434,8 @@ fn limited(wheels: Wheels, limit_mps: f64) -> Wheels {
     if fastest_mps > limit_mps { wheels.map(|speed| speed * (limit_mps / fastest_mps)) } else { wheels }
 }
 
-/// From one pair of speeds towards another, on the straight line between them, by at most `change_mps` a wheel.
+/// From one pair of speeds towards another, on the straight line between them, by at most `change_mps` a
+/// wheel.
 fn eased(from: Wheels, to: Wheels, change_mps: f64) -> Wheels {
     let (left, right) = (to[0] - from[0], to[1] - from[1]);
     let largest_mps = left.abs().max(right.abs());

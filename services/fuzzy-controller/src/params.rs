@@ -14,9 +14,9 @@ pub enum RangeSource {
     Tof,
     /// A laser's scan.
     Scan,
-    /// Both; the nearer counts.
+    /// The time-of-flight sensors and the laser; the nearer reading counts.
     Both,
-    /// None: no avoidance.
+    /// No sensor: no avoidance.
     None,
 }
 
@@ -83,16 +83,18 @@ pub struct Params {
     /// Avoidance takes over below this clearance in front.
     #[schemars(range(min = 0.01, max = 10.0))]
     pub front_trigger_m: f64,
-    /// Avoidance takes over below this clearance at the sides; below the corridor's, or the robot shies at every wall.
+    /// Avoidance takes over below this clearance at the sides; below the corridor's, or the robot shies at
+    /// every wall.
     #[schemars(range(min = 0.01, max = 10.0))]
     pub side_trigger_m: f64,
     /// Below this clearance in front the robot brakes at once, and then only turns.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub brake_distance_m: f64,
-    /// In front of an obstacle the robot turns to its path, which will lead around it, instead of away by the rules; without such a
-    /// path it waits.
+    /// In front of an obstacle the robot turns to its path, which will lead around it, instead of away by the
+    /// rules; without such a path it waits.
     pub turns_by_path: bool,
-    /// No motion brings the hull nearer than this to what the time-of-flight sensors saw a moment ago; 0 does not look.
+    /// No motion brings the hull nearer than this to what the time-of-flight sensors saw a moment ago; 0
+    /// switches this off.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub keep_away_m: f64,
     /// Deceleration of the drive, for the speed ahead of obstacles (note 2.5).

@@ -1,8 +1,9 @@
 //! What was seen around the robot a moment ago, and which motions keep away from it.
 //!
-//! The sensors leave the body's corners uncovered, and a turn on the spot swings those corners out: a 0.61 x 0.51 m body needs a circle
-//! of 0.40 m. So the controller remembers, in the frame of odometry, where readings ended, and tries each motion for a moment ahead
-//! against them, as the dynamic window approach does (Fox, Burgard and Thrun 1997), before the wheels are told.
+//! The sensors leave the body's corners uncovered, and a turn on the spot swings those corners out: a 0.61 x
+//! 0.51 m body needs a circle of 0.40 m. So the controller remembers, in the frame of odometry, where
+//! readings ended, and tries each motion for a moment ahead against them, as the dynamic window approach does
+//! (Fox, Burgard and Thrun 1997), before the wheels are told.
 
 use crate::controllers::Wheels;
 use crate::params::Params;
@@ -13,8 +14,8 @@ use serde::{Deserialize, Serialize};
 /// Known walls are looked at in points so far apart, and within this distance.
 const WALL_POINT_M: f64 = 0.04;
 const WALLS_WITHIN_M: f64 = 1.1;
-/// Furniture stands along walls and may be so long, although only its ends are seen: a mail cart's shelf lies below the sensors
-/// (COF-122). What is seen this near, and not at a known wall, is taken for such.
+/// Furniture stands along walls and may be this long, although only its ends are seen: a mail cart's shelf
+/// lies below the sensors (COF-122). What is seen this near, and not at a known wall, is taken for such.
 const FURNITURE_M: f64 = 0.90;
 const FURNITURE_WITHIN_M: f64 = 0.45;
 const FURNITURE_POINTS: u32 = 9;
@@ -24,14 +25,14 @@ const STUCK_S: f64 = 3.0;
 const DOUBT_S: f64 = 4.0;
 const OFF_WALL_M: f64 = 0.12;
 const LONG_WALL_M: f64 = 1.0;
-/// A motion is tried for so long, in so many steps.
+/// How long a motion is tried, and in how many steps.
 const TRIED_S: f64 = 0.9;
 const TRIES: usize = 6;
 /// What is too near already may come nearer by this, for noise.
 const NOISE_M: f64 = 0.001;
 /// A robot that moves less than this between two looks, in metres and radians, stands.
 const STILL: f64 = 5e-4;
-/// The robot does not move so far between two looks.
+/// The robot does not move this far between two looks.
 const JUMP_M: f64 = 0.5;
 /// Slow enough for the narrowest places.
 const SLOW_MPS: f64 = 0.10;
@@ -56,7 +57,8 @@ pub(crate) struct Surround {
     doubted_since: Option<Time>,
 }
 
-/// What was seen around the robot when a predecessor last said so: places in the frame of odometry in millimetres, how sure, and when.
+/// What was seen around the robot when a predecessor last said so: places in the frame of odometry in
+/// millimetres, how sure, and when.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Snapshot {
     points: Vec<KeptSighting>,
@@ -75,7 +77,8 @@ impl Surround {
         self.assumed = Sightings::restored(&snapshot.assumed);
     }
 
-    /// Takes in the newest readings, with the robot at `here` in the frame of odometry; without a place nothing is known.
+    /// Takes in the newest readings, with the robot at `here` in the frame of odometry; without a place
+    /// nothing is known.
     pub(crate) fn observe(
         &mut self,
         now: Time,
@@ -129,8 +132,8 @@ impl Surround {
 
     /// Notices that the robot wants to move and may not, and doubts the assumptions then.
     ///
-    /// What was seen does not grow old while the robot stands although it may drive (a guard holds it), or because it is `blind`, without inputs: it
-    /// finds everything where it was.
+    /// What was seen does not grow old while the robot stands although it may drive (a guard holds it), or
+    /// because it is `blind`, without inputs: it finds everything where it was.
     pub(crate) fn judge(&mut self, now: Time, wanted: Wheels, allowed: Wheels, blind: bool) {
         let last = self.judged.replace((now, self.here));
         let still = |(_, there): (Time, Option<Pose2>)| match (there, self.here) {
@@ -182,8 +185,9 @@ impl Surround {
         }
     }
 
-    /// The motion nearest to the wanted one that keeps away from everything seen; standing when there is none.
-    /// `may_advance` lets a turn on the spot that cannot be turned here be put off: the robot then drives on straight.
+    /// The motion nearest to the wanted one that keeps away from everything seen; standing when there is
+    /// none. `may_advance` lets a turn on the spot that cannot be turned here be put off: the robot then
+    /// drives on straight.
     pub(crate) fn allowed(&self, wanted: Wheels, may_advance: bool, params: &Params) -> Wheels {
         if params.keep_away_m <= 0.0 {
             return wanted;
@@ -208,7 +212,8 @@ impl Surround {
         clear.unwrap_or([0.0; 2])
     }
 
-    /// Whether, during the next moment, nothing seen comes nearer to the body than `margin_m`, or than it is already.
+    /// Whether, during the next moment, nothing seen comes nearer to the body than `margin_m`, or than it is
+    /// already.
     fn is_clear(&self, here: Pose2, [left, right]: Wheels, margin_m: f64, params: &Params) -> bool {
         let step_s = TRIED_S / TRIES as f64;
         let (step_m, turn_rad) = (0.5 * (left + right) * step_s, (right - left) / params.track_m * step_s);
@@ -230,7 +235,8 @@ impl Surround {
     }
 }
 
-/// A fan of slow motions in the direction of the wanted one: first what gets on best, and then what turns most alike.
+/// A fan of slow motions in the direction of the wanted one: first what gets on best, and then what turns
+/// most alike.
 fn curves(wanted: Wheels) -> Vec<Wheels> {
     let (mean_mps, rim_mps) = (0.5 * (wanted[0] + wanted[1]), 0.5 * (wanted[1] - wanted[0]));
     let fan = [1.0, 0.6, 0.3, 0.0].into_iter().flat_map(|share| {
@@ -248,7 +254,8 @@ fn curves(wanted: Wheels) -> Vec<Wheels> {
     fan
 }
 
-/// Instead of a turn on the spot: curves with the same turn, forwards; straight on if that may be; the same curves backwards.
+/// Instead of a turn on the spot: curves with the same turn, forwards; straight on if that may be; the same
+/// curves backwards.
 fn turns(wanted: Wheels, may_advance: bool) -> Vec<Wheels> {
     let rim_mps = 0.5 * (wanted[1] - wanted[0]);
     let curve = |mean_mps: f64| limited([mean_mps - rim_mps, mean_mps + rim_mps]);
@@ -283,7 +290,8 @@ mod tests {
         }
     }
 
-    /// What is allowed at the origin of odometry, which is the map's too, between walls at these places across.
+    /// What is allowed at the origin of odometry, which is the map's too, between walls at these places
+    /// across.
     #[track_caller]
     fn check(walls_m: &[f64], seen: &[(usize, f32)], wanted: Wheels, holds: impl Fn(Wheels) -> bool) {
         let mut surround = Surround::default();

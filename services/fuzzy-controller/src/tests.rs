@@ -524,8 +524,8 @@ proptest! {
         near(controllers().rotation.step([-angle_deg]), [right, left], 1e-12);
     }
 
-    /// Rules 1, 14 and 10 to 12 with 14 are ties (equal sets left and right, front not far): where none of them speaks,
-    /// avoidance is a mirror image of itself.
+    /// Rules 1, 14 and 10 to 12 with 14 are ties (equal sets left and right, front not far): where none of
+    /// them speaks, avoidance is a mirror image of itself.
     #[test]
     fn avoidance_is_a_mirror_image_but_for_ties(left in 0.0..0.7, front in 0.0..0.7, right in 0.0..0.7) {
         let mut controllers = controllers();

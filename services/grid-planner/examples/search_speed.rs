@@ -1,4 +1,5 @@
-//! Milliseconds a search on an office of 1000 x 1000 cells of 5 cm, over long distances: `cargo run --release -p grid-planner --example search_speed`.
+//! Milliseconds a search on an office of 1000 x 1000 cells of 5 cm, over long distances:
+//! `cargo run --release -p grid-planner --example search_speed`.
 
 use grid_planner::{Algorithm, Costs, Field, Grid, Params, Question, Router, Search};
 use std::time::Instant;

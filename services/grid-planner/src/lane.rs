@@ -6,9 +6,9 @@ use std::f64::consts::SQRT_2;
 /// Free cells in a row count up to here.
 pub(crate) const FAR: u16 = 4000;
 /// A passage is a hallway where it is this much longer than wide; an elevator with the hallway before its
-/// door is none.
+/// door is not.
 const SLENDER: f64 = 3.5;
-/// So near to the lane's middle is in the lane, in metres.
+/// How near to the lane's middle counts as in the lane, in metres.
 const TOLERANCE_M: f64 = 0.01;
 
 /// Gives each cell of a hallway, with how far beside the lane it lies in each direction of travel, in metres,

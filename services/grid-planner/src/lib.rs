@@ -110,7 +110,7 @@ impl GridPlanner {
         Ok(Self { leaves, ..Self::with_grids(params, grids)? })
     }
 
-    /// The same with the floors' grids given.
+    /// A planner with the floors' grids given.
     ///
     /// # Errors
     /// When a parameter is out of range.

@@ -1,12 +1,14 @@
 //! Walking a straight line through the cells of a grid.
 
-/// Calls `visit(column, row)` for every cell that the line between two points (in units of cells) touches, also both cells beside a
-/// corner that it passes exactly, until `visit` says no. Says whether the end was reached (Amanatides and Woo 1987).
+/// Calls `visit(column, row)` for every cell that the line between two points (in units of cells) touches,
+/// also both cells beside a corner that it passes exactly, until `visit` says no. Says whether the end was
+/// reached (Amanatides and Woo 1987).
 pub(crate) fn visit(from: [f64; 2], to: [f64; 2], mut visit: impl FnMut(i64, i64) -> bool) -> bool {
     pieces(from, to, |column, row, _| visit(column, row))
 }
 
-/// The same; the third argument is how much of the line lies in the cell, as a fraction of the whole (zero for cells only touched).
+/// As [`visit`]; the third argument is how much of the line lies in the cell, as a fraction of the whole
+/// (zero for cells only touched).
 pub(crate) fn pieces(from: [f64; 2], to: [f64; 2], mut visit: impl FnMut(i64, i64, f64) -> bool) -> bool {
     // Two crossings closer than this, as a fraction of the line, are one corner.
     const CORNER: f64 = 1e-9;

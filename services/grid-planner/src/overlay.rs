@@ -1,4 +1,5 @@
-//! Obstacles seen by the time-of-flight sensors: they come into the field, are freed by readings that pass through, and fade.
+//! Obstacles seen by the time-of-flight sensors: they come into the field, are freed by readings that pass
+//! through, and fade.
 
 use crate::field::Field;
 use crate::line;
@@ -10,8 +11,8 @@ use std::time::Duration;
 const SIGHTING: u8 = 24;
 /// What weighs most, so that an obstacle that leaves is forgotten soon.
 const WEIGHT_MAX: u8 = 5 * SIGHTING;
-/// What lies in the outer part of a cone fills too little of it to be seen for sure: a reading that passes takes much weight within
-/// this share of its width, and little beside it, a cell beyond its edge included.
+/// What lies in the outer part of a cone fills too little of it to be seen for sure: a reading that passes
+/// takes much weight within this share of its width, and little beside it, a cell beyond its edge included.
 const SURE_SHARE: f64 = 0.6;
 const SURE_PASS: u8 = 8;
 const UNSURE_SHARE: f64 = 1.3;
@@ -32,7 +33,7 @@ pub(crate) struct Rules {
     pub(crate) wall_tolerance_m: f64,
     /// Sightings until a cell blocks.
     pub(crate) confirm: u8,
-    /// What was not seen again for so long is gone.
+    /// What was not seen again for this long is gone.
     pub(crate) memory: Duration,
 }
 
@@ -93,7 +94,8 @@ impl Overlay {
         };
         for (eye, hit_m, _) in looks.clone() {
             let Some(hit_m) = hit_m else { continue };
-            // It may stand anywhere across the cone, but for where a neighbour sees through; the rest is seen from nearer by.
+            // It may stand anywhere across the cone, but for where a neighbour sees through; the rest is seen
+            // from nearer by.
             if let Some(across) = unexplained((field, leaves), rules, eye, hit_m) {
                 let all_free = across.clone().all(free);
                 let mut last = None;
@@ -172,8 +174,9 @@ fn sees(rules: &Rules, eye: Pose2, reach_m: f64, place: Point2<f64>, share: f64)
     seen.x > 0.0 && seen.x < reach_m && seen.y.abs() <= share * rules.half_cone_rad.tan() * seen.x
 }
 
-/// The places across the cone at a reading's range, unless a known wall stands on the way to one of them or near it, or the closed leaf
-/// of a known door: then the reading is that wall, or a door that may open. The range counts along the axis.
+/// The places across the cone at a reading's range, unless a known wall stands on the way to one of them or
+/// near it, or the closed leaf of a known door: then the reading is that wall, or a door that may open. The
+/// range counts along the axis.
 fn unexplained(
     (field, leaves): (&Field, &[Segment]),
     rules: &Rules,

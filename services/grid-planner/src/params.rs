@@ -45,8 +45,8 @@ pub struct Params {
     /// Observed obstacles are kept farther away than walls by this much.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub obstacle_margin_m: f64,
-    /// Extra cost per metre for each metre beside the lane on the right of a hallway (COF-006); zero for no
-    /// lanes.
+    /// Extra cost per metre for each metre beside the lane on the right of a hallway (COF-006); zero means
+    /// that there are no lanes.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub keep_right_weight: f64,
     /// The lane's middle, from the wall on the right.
@@ -56,7 +56,7 @@ pub struct Params {
     #[schemars(range(min = 0.5, max = 10.0))]
     pub hallway_width_max_m: f64,
     /// Extra cost per metre travelled in contact with the inflated walls, falling to zero at `clearance_m`;
-    /// zero for none.
+    /// zero switches it off.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub clearance_weight: f64,
     /// Beyond this distance a wall costs nothing.
@@ -71,10 +71,10 @@ pub struct Params {
     /// A robot farther from its path than this gets a new one.
     #[schemars(range(min = 0.1, max = 5.0))]
     pub stray_m: f64,
-    /// Not more often than this is a path for one request changed, nor an unreachable goal tried again.
+    /// The least time before a path for one request is changed, or an unreachable goal is tried again.
     #[schemars(range(min = 0.1, max = 60.0))]
     pub replan_interval_s: f64,
-    /// Range readings from here on are no obstacle (COF-030).
+    /// Range readings of at least this are no obstacle (COF-030).
     #[schemars(range(min = 0.1, max = 4.0))]
     pub range_max_m: f64,
     /// Half of a range sensor's field of view (COF-021).
@@ -83,10 +83,10 @@ pub struct Params {
     /// Readings that end this near to a known wall are that wall.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub wall_tolerance_m: f64,
-    /// An obstacle counts when it was seen so often.
+    /// How often an obstacle must be seen to count.
     #[schemars(range(min = 1, max = 5))]
     pub confirm_sightings: u8,
-    /// Obstacles that were not seen for so long are forgotten.
+    /// Obstacles that were not seen for this long are forgotten.
     #[schemars(range(min = 0.5, max = 600.0))]
     pub obstacle_memory_s: f64,
     /// Without effect, as a grid has no waypoints to draw: it is here so that the table of a sampling planner

@@ -1,11 +1,13 @@
-//! A monotone priority queue of integer keys: one bucket a key, so that the order is exact and nothing is ever compared.
+//! A monotone priority queue of integer keys: one bucket a key, so that the order is exact and nothing is
+//! ever compared.
 
 /// Keys may lie this far above the smallest key in the queue.
 pub(crate) const SPAN: u32 = 1 << 15;
 const NONE: u32 = u32::MAX;
 const WORDS: usize = SPAN as usize / 64;
 
-/// A circle of buckets (Dial 1969) with two levels of bits that say which are not empty; entries are linked in one arena.
+/// A circle of buckets (Dial 1969) with two levels of bits that say which are not empty; entries are linked
+/// in one arena.
 #[derive(Debug, Clone)]
 pub(crate) struct BucketQueue {
     /// First entry of each bucket.
@@ -108,7 +110,8 @@ impl BucketQueue {
             (group, later)
         } else {
             let groups = self.summary.len();
-            // The last turn comes back to the words before the current one, and to the current one's lower bits.
+            // The last turn comes back to the words before the current one, and to the current one's lower
+            // bits.
             (1..=groups).map(|ahead| (group + ahead) % groups).find_map(|group| {
                 let bits = self.summary[group];
                 (bits != 0).then_some((group, bits))

@@ -36,7 +36,8 @@ pub struct Router {
 }
 
 impl Router {
-    /// Finds the way. Only `Found` leaves waypoints; the first is the start, the last the goal or the free cell next to it.
+    /// Finds the way. Only `Found` leaves waypoints; the first is the start, the last the goal or the free
+    /// cell next to it.
     pub fn plan(&mut self, field: &Field, question: &Question) -> PlanStateName {
         self.waypoints.clear();
         let grid = field.grid();
@@ -100,8 +101,8 @@ fn waypoint([x_m, y_m]: [f64; 2]) -> Waypoint {
     Waypoint { x_m, y_m }
 }
 
-/// The free cell nearest to `cell`, itself first, at most `reach` cells away. An escape does not cross a wall: only cells whose straight
-/// line from `cell` meets none are taken, unless `cell` itself is within one.
+/// The free cell nearest to `cell`, itself first, at most `reach` cells away. An escape does not cross a
+/// wall: only cells whose straight line from `cell` meets none are taken, unless `cell` itself is within one.
 fn nearest_free(field: &Field, cell: usize, reach: f64, escape: bool) -> Option<usize> {
     if !field.is_blocked(cell) {
         return Some(cell);

@@ -4,7 +4,8 @@ use crate::field::Field;
 use crate::grid::DIRECTIONS;
 use crate::queue::BucketQueue;
 
-/// Cost of a straight step. 1393 / 985 is √2 to within 4e-7, so integer costs order paths as their lengths do.
+/// Cost of a straight step. 1393 / 985 is √2 to within 4e-7, so integer costs order paths as their lengths
+/// do.
 pub const STRAIGHT: u32 = 985;
 /// Cost of a diagonal step.
 pub const DIAGONAL: u32 = 1393;
@@ -19,7 +20,8 @@ const CLOSED: u32 = 16;
 struct Node {
     /// Cost from the start.
     cost: u32,
-    /// Bits 0 to 3: the direction by which it was reached; bit 4: closed; above: the search in which all this was written.
+    /// Bits 0 to 3: the direction by which it was reached; bit 4: closed; above: the search in which all this
+    /// was written.
     tag: u32,
 }
 
@@ -34,9 +36,10 @@ pub struct Search {
 }
 
 impl Search {
-    /// The cheapest way from one cell to another, both included, as flat indices; `None` where there is none. The caller makes sure
-    /// that both lie within the grid. On a field without costs only the canonical ones among equally short paths are searched
-    /// (Harabor and Grastien 2012, "The JPS pathfinding system", the rules without corner cutting, step by step).
+    /// The cheapest way from one cell to another, both included, as flat indices; `None` where there is none.
+    /// The caller makes sure that both lie within the grid. On a field without costs only the canonical ones
+    /// among equally short paths are searched (Harabor and Grastien 2012, "The JPS pathfinding system", the
+    /// rules without corner cutting, step by step).
     pub fn find(&mut self, field: &Field, start: usize, goal: usize) -> Option<&[u32]> {
         self.expanded = 0;
         self.cells.clear();
@@ -134,9 +137,10 @@ impl Search {
     }
 }
 
-/// For the direction by which a cell was reached and the moves that are open there: the moves that a shortest path may need.
-/// A diagonal step goes on diagonally or by its two components. A straight one goes on straight; it turns only where the cell
-/// beside its last one is not reachable from there, which the closed diagonal backwards shows.
+/// For the direction by which a cell was reached and the moves that are open there: the moves that a shortest
+/// path may need. A diagonal step goes on diagonally or by its two components. A straight one goes on
+/// straight; it turns only where the cell beside its last one is not reachable from there, which the closed
+/// diagonal backwards shows.
 static CANONICAL: [[u8; 256]; 9] = canonical();
 
 const fn canonical() -> [[u8; 256]; 9] {

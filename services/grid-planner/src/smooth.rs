@@ -18,8 +18,9 @@ pub(crate) struct Smoother {
 }
 
 impl Smoother {
-    /// The cheapest chain of straight pieces from the first to the last point through some of the others, in units of cells; no piece
-    /// touches a blocked cell. Costs count along the pieces as they do in the search, so the lane is kept.
+    /// The cheapest chain of straight pieces from the first to the last point through some of the others, in
+    /// units of cells; no piece touches a blocked cell. Costs count along the pieces as they do in the
+    /// search, so the lane is kept.
     pub(crate) fn straighten(&mut self, field: &Field, points: &[[f64; 2]]) -> &[[f64; 2]] {
         self.choose_candidates(points);
         self.cheapest_chain(field, AHEAD);

@@ -334,7 +334,7 @@ impl<'a> Words<'a> {
         Self { keyword, words: line.split_ascii_whitespace().collect() }
     }
 
-    /// The same, of a line that has exactly so many.
+    /// The words of a line that has exactly `wanted` of them.
     pub(crate) fn exactly(keyword: &'static str, line: &'a str, wanted: usize) -> Result<Self, Fault> {
         let words = Self::new(keyword, line);
         words.need(wanted)?;

@@ -35,12 +35,12 @@ pub enum Timing {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Laser {
-    /// The first of those below of which the log holds scans.
+    /// The first laser, in the order of this list, of which the log holds scans.
     #[default]
     Auto,
-    /// The one that looks ahead: `FLASER`, `ROBOTLASER1`, `RAWLASER1`.
+    /// The laser that looks ahead: `FLASER`, `ROBOTLASER1`, `RAWLASER1`.
     Front,
-    /// The one that looks to the rear: `RLASER`, `ROBOTLASER2`, `RAWLASER2`.
+    /// The laser that looks to the rear: `RLASER`, `ROBOTLASER2`, `RAWLASER2`.
     Rear,
     /// `LASER3`, `RAWLASER3`.
     Third,
@@ -92,11 +92,11 @@ impl Scans {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum OdometryLines {
-    /// As it is recorded.
+    /// The odometry as it is recorded.
     #[default]
     Recorded,
-    /// Only the pieces of way between two scans, one put to the other's end. In a log that was corrected later
-    /// the odometry after each scan begins anew at that scan's corrected pose: the step to there is no
+    /// Only the pieces of way between two scans, one put to the other's end. In a log that was corrected
+    /// later the odometry after each scan begins anew at that scan's corrected pose: the step to there is no
     /// odometry, but the truth.
     BetweenScans,
 }
@@ -128,7 +128,7 @@ pub struct Params {
     pub odometry: OdometryLines,
     /// Publishes the true poses as `location/pose` too, in the place of a localiser: to make a map.
     pub truth_as_location: bool,
-    /// How many times faster than it was recorded.
+    /// How many times faster than it was recorded the log is played.
     #[schemars(range(min = 0.001, max = 100000.0))]
     pub speed: f64,
     /// Where the times of a CARMEN log come from.
@@ -139,10 +139,10 @@ pub struct Params {
     /// Wait after the start, on the board's clock, so that readers are there for the first message.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub start_delay_s: f64,
-    /// How often it is looked what is due.
+    /// Time between two looks at what is due.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub tick_ms: f64,
-    /// Laser ranges from here on mean "nothing seen", where the log does not say it.
+    /// Laser ranges of at least this mean "nothing seen", where the log does not say it.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub range_max_m: f64,
     /// Distance between the wheels, from which their paths are made up.
@@ -160,10 +160,10 @@ pub struct Params {
 pub struct AnchorPlace {
     /// Its number in the log.
     pub id: u32,
-    /// Place.
+    /// Place along x.
     #[schemars(range(min = -1000000.0, max = 1000000.0))]
     pub x_m: f64,
-    /// Place.
+    /// Place along y.
     #[schemars(range(min = -1000000.0, max = 1000000.0))]
     pub y_m: f64,
     /// Height above the floor.
@@ -175,10 +175,10 @@ pub struct AnchorPlace {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pose {
-    /// Place.
+    /// Place along x.
     #[schemars(range(min = -1000000.0, max = 1000000.0))]
     pub x_m: f64,
-    /// Place.
+    /// Place along y.
     #[schemars(range(min = -1000000.0, max = 1000000.0))]
     pub y_m: f64,
     /// Direction.

@@ -318,7 +318,8 @@ fn the_committed_drive_is_whole() {
 #[test]
 fn recordings_of_carmen_are_whole() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/laser_carmen/");
-    // Some lines of the first two are stamped with what memory held: mostly a jump away and one back for each.
+    // Some lines of the first two are stamped with what memory held: mostly a jump away and one back for
+    // each.
     for (name, scans, jumps) in
         [("intel", 910, 94), ("freiburg-079", 4791, 29), ("csail", 406, 0), ("belgioioso", 395, 0)]
     {

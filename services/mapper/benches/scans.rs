@@ -81,7 +81,8 @@ fn drive(scene: &Scene, size_m: f64) -> Drive {
     Drive { header, scans, mean_m: sum_m / (SCANS * BEAMS) as f64 }
 }
 
-/// Beam by beam, cell by cell (Bresenham 1965, in fixed point): cells near the sensor are touched by every beam that passes.
+/// Beam by beam, cell by cell (Bresenham 1965, in fixed point): cells near the sensor are touched by every
+/// beam that passes.
 struct Beams {
     frame: GridFrame,
     cells: Grid<i16>,

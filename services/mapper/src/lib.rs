@@ -1,5 +1,6 @@
-//! Builds an occupancy grid from poses and scans by the binary Bayes filter (ASN-120 to ASN-122; Thrun et al. 2005, tables 4.2 and 9.2).
-//! Each cell is touched once a scan, and scans are filled in as polygons, row by row, instead of beam by beam.
+//! Builds an occupancy grid from poses and scans by the binary Bayes filter (ASN-120 to ASN-122; Thrun et al.
+//! 2005, tables 4.2 and 9.2). Each cell is touched once a scan, and scans are filled in as polygons, row by
+//! row, instead of beam by beam.
 
 mod map;
 mod params;

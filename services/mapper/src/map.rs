@@ -157,8 +157,8 @@ impl Map {
         })
     }
 
-    /// The same with every cell occupied, free or unknown, as trinary map files have it: occupied above 0.65,
-    /// free below 0.196.
+    /// The map as others know it, with every cell occupied, free or unknown, as trinary map files have it:
+    /// occupied above 0.65, free below 0.196.
     pub fn to_trinary_grid(&self) -> OccupancyGrid {
         self.known(|value| match probability(f64::from(value) / PER_UNIT) {
             occupied if occupied > 0.65 => Occupancy::OCCUPIED,

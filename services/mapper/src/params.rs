@@ -12,12 +12,12 @@ pub const SAVED_AS: MapImage = MapImage::Pgm;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
-    /// ROS map file (YAML) to begin with; empty begins with nothing known. Its size and place replace those
-    /// below.
+    /// ROS map file (YAML) to begin with; empty begins with nothing known. Its size and place replace
+    /// `min_x_m`, `min_y_m`, `width_m` and `height_m`.
     #[schemars(extend("format" = "path"))]
     pub load: String,
     /// ROS map file (YAML) that is written, with an image beside it, at the end; empty for none. The run
-    /// fails when it cannot be, or takes longer than `stop_after_ms` of the graph.
+    /// fails when it cannot be written, or when that takes longer than `stop_after_ms` of the graph.
     #[schemars(extend("format" = "path"))]
     pub save: String,
     /// The map is also written this often while it changes, so that less is lost; 0 for at the end only.
@@ -38,8 +38,8 @@ pub struct Params {
     /// Extent along y.
     #[schemars(range(min = 0.1, max = 2000.0))]
     pub height_m: f64,
-    /// The floor that is mapped; poses on other floors are left out. Nothing for whatever floor the robot is
-    /// on.
+    /// The floor that is mapped; poses on other floors are left out. Not set, it is whatever floor the
+    /// robot is on.
     pub floor: Option<i32>,
     /// What a reading says of the cell in which it ends: the probability that it is occupied (X-4B).
     #[schemars(range(min = 0.51, max = 0.99))]
@@ -50,11 +50,12 @@ pub struct Params {
     /// The log-odds of a cell stay within this, so that what has changed is learnt again (X-4B).
     #[schemars(range(min = 0.5, max = 10.0))]
     pub clamp_log_odds: f64,
-    /// Readings are used up to here; one that sees something farther away only clears as far.
+    /// Readings are used up to this distance; one that sees something farther away only clears the cells up
+    /// to it.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub range_max_m: f64,
-    /// A beam that sees nothing within its sensor's range clears as far, at most up to `range_max_m`; 0 when
-    /// it may have been swallowed by glass or black paint, and tells nothing.
+    /// A beam that sees nothing within its sensor's range clears the cells up to that range, at most up to
+    /// `range_max_m`; 0 when it may have been swallowed by glass or black paint, and tells nothing.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub clear_max_m: f64,
     /// A beam speaks for what lies within its width, and no farther than halfway to the next beam.

@@ -28,7 +28,8 @@ impl Track {
         self.newest.is_some_and(|(newest, _)| newest >= time)
     }
 
-    /// The pose at a time: between the two newest, or the nearer one of them, when they are no farther away than `max_age`.
+    /// The pose at a time: between the two newest, or the nearer one of them, when they are no farther away
+    /// than `max_age`.
     pub(crate) fn at(&self, time: Time, max_age: Duration) -> Option<Pose2> {
         let apart = |other: Time| time.since(other).max(other.since(time));
         let newest = self.newest?;

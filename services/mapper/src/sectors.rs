@@ -1,4 +1,5 @@
-//! A scan as sectors: what each beam says is free, and where it says something stands, in units of the grid's cells.
+//! A scan as sectors: what each beam says is free, and where it says something stands, in units of the grid's
+//! cells.
 
 use geometry::{GridFrame, Pose2};
 use messages::RangeScan;
@@ -37,9 +38,10 @@ pub(crate) struct Sectors {
 impl Sectors {
     /// Reads a scan taken at a pose of the robot; `None` when it cannot be used.
     ///
-    /// The inverse model of Thrun et al. 2005, table 9.2: a cell belongs to the beam nearest in direction; up to the reading it is free,
-    /// around the reading, as thick as a cell, it is occupied. Readings of zero, below, or NaN are none. Those beyond our limit clear up
-    /// to it; those at the sensor's limit or beyond saw nothing.
+    /// The inverse model of Thrun et al. 2005, table 9.2: a cell belongs to the beam nearest in direction; up
+    /// to the reading it is free, around the reading, as thick as a cell, it is occupied. Readings of zero,
+    /// below, or NaN are invalid. Those beyond our limit clear up to it; those at the sensor's limit or
+    /// beyond saw nothing.
     pub(crate) fn read(
         &mut self,
         frame: &GridFrame,
@@ -141,13 +143,15 @@ impl Sectors {
     }
 }
 
-/// The beams' common measures. Directions are unit vectors, turned by multiplication: 16 384 turns lose 1e-12.
+/// The beams' common measures. Directions are unit vectors, turned by multiplication: 16 384 turns lose
+/// 1e-12.
 #[derive(Debug, Clone, Copy)]
 struct Fan {
     centre: Point,
     /// Cells to the metre.
     per_m: f64,
-    /// As far as the sensor sees, as far as its readings are used, and as far as it clears when it sees nothing.
+    /// As far as the sensor sees, as far as its readings are used, and as far as it clears when it sees
+    /// nothing.
     sensor_m: f64,
     limit_m: f64,
     clear_m: f64,

@@ -1,4 +1,5 @@
-//! Which cells of which rows have their middles inside a polygon: found along the polygon's edges, not cell by cell.
+//! Which cells of which rows have their middles inside a polygon: found along the polygon's edges, not cell
+//! by cell.
 
 use crate::sectors::Point;
 
@@ -22,8 +23,8 @@ pub(crate) struct Spans {
 }
 
 impl Spans {
-    /// Calls `fill(row, first column, column behind the last)` for every run of cells inside, each cell at most once. A middle on an edge
-    /// belongs to what lies to its right.
+    /// Calls `fill(row, first column, column behind the last)` for every run of cells inside, each cell at
+    /// most once. A middle on an edge belongs to what lies to its right.
     pub(crate) fn visit(
         &mut self,
         polygon: &[Point],

@@ -197,7 +197,8 @@ fn the_sensor_sits_where_its_header_says() {
 
 // ---- Properties.
 
-/// Thrun's table 9.2 for one cell, in the grid's units: straight ends instead of round ones, as sectors are narrow.
+/// Thrun's table 9.2 for one cell, in the grid's units: straight ends instead of round ones, as sectors are
+/// narrow.
 fn by_hand(map: &Map, sensor: Pose2, scan: &RangeScan, ranges: &[f32], place: Point2<f64>) -> Option<i16> {
     const DOUBT: f64 = 1e-7;
     let (dx, dy) = (place.x - sensor.x_m, place.y - sensor.y_m);
@@ -377,7 +378,8 @@ fn scan_at<'a>(ms: u64, header: &'a RangeScan, ranges: &'a [f32]) -> Stamped<'a,
     Stamped::with_elements(Time::from_nanos(ms * 1_000_000), header, ranges)
 }
 
-/// Poses (time in ms, x), then a scan at a time, with 20 ms steps until 1 s: where the scan is, if it is anywhere.
+/// Poses (time in ms, x), then a scan at a time, with 20 ms steps until 1 s: where the scan is, if it is
+/// anywhere.
 #[track_caller]
 fn check_placed(poses: &[(u64, f64)], scan_ms: u64, expected_x_m: Option<f64>) {
     let mut mapper = Mapper::new(params()).unwrap();

@@ -1,5 +1,6 @@
-//! Carries out single motions: Move, Turn, and Turnback when a wall is too near (NXT-020 to NXT-024). While it drives ahead it watches what
-//! lies there, slows down before it, and drives back where the guard says STOP; the report tells that to whoever ordered the motion.
+//! Carries out single motions: Move, Turn, and Turnback when a wall is too near (NXT-020 to NXT-024). While
+//! it drives ahead it watches what lies there, slows down before it, and drives back where the guard says
+//! STOP; the report tells that to the service that ordered the motion.
 
 mod motion;
 mod params;
@@ -51,7 +52,8 @@ pub struct MoveController {
 /// What the guard's word means for a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Ahead {
-    /// Free, with the nearest thing so far beyond the place where the guard stops the robot; negative where that is unclear.
+    /// Free, with the nearest thing so far beyond the place where the guard stops the robot; negative where
+    /// that is unclear.
     Free(f64),
     /// Something is too near.
     TooNear,

@@ -9,7 +9,7 @@ const FARTHEST_M: f64 = 100.0;
 const MOST_RAD: f64 = 7.0;
 /// Wheels slower than this stand.
 const STANDS_MPS: f64 = 1e-3;
-/// A retreat shorter than this is none.
+/// A retreat shorter than this is left out.
 const NO_RETREAT_M: f64 = 0.002;
 
 /// Where a motion is.

@@ -9,7 +9,7 @@ use std::time::Duration;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
-    /// A command for the wheels at least so often.
+    /// The longest time from one command for the wheels to the next.
     #[schemars(range(min = 5, max = 100))]
     pub period_ms: u32,
     /// Distance between the middles of the two driven wheels.
@@ -27,10 +27,10 @@ pub struct Params {
     /// Turns end with this deceleration.
     #[schemars(range(min = 0.1, max = 30.0))]
     pub braking_rad_per_s2: f64,
-    /// Nothing ends slower, until it is there.
+    /// The least speed at the end of a way, until the robot is there.
     #[schemars(range(min = 0.001, max = 0.1))]
     pub creep_mps: f64,
-    /// The same for turns.
+    /// The least turning speed at the end of a turn, until the robot has turned.
     #[schemars(range(min = 0.005, max = 1.0))]
     pub creep_rad_per_s: f64,
     /// A way that is shorter than ordered by no more than this is done.
@@ -45,10 +45,10 @@ pub struct Params {
     /// How far the robot drives back from a wall that is too near, unless the order says less.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub retreat_m: f64,
-    /// Speed of that, and of every way back: within what `base-driver` lets pass.
+    /// Speed of a retreat from a wall, and of every way back: within what `base-driver` lets pass.
     #[schemars(range(min = 0.01, max = 0.3))]
     pub retreat_speed_mps: f64,
-    /// Wheels that stand for so long although they should turn are blocked.
+    /// Wheels that stand for this long although they should turn are blocked.
     #[schemars(range(min = 0.1, max = 30.0))]
     pub patience_s: f64,
 }

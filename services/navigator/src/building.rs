@@ -51,8 +51,9 @@ pub struct Building {
 }
 
 impl Building {
-    /// Picks the doors, the home and the first elevator out of a world. The home is the place of that name, else the middle of the first
-    /// area marked as tea room, else where the robot starts. The robot waits `wait_m` before the elevator's door.
+    /// Picks the doors, the home and the first elevator out of a world. The home is the place of that name,
+    /// else the middle of the first area marked as tea room, else where the robot starts. The robot waits
+    /// `wait_m` before the elevator's door.
     pub fn from_world(world: &World, home: &str, wait_m: f64) -> Self {
         let rooms = world.doors.iter().filter_map(|door| {
             let lines = world.door_geometry(door)?;

@@ -1,4 +1,5 @@
-//! Halting at a door: creep along the hallway until its centre line is known, halt on it, correct what was missed.
+//! Halting at a door: creep along the hallway until its centre line is known, halt on it, correct what was
+//! missed.
 
 use crate::params::Params;
 use geometry::{Pose2, angle};

@@ -1,5 +1,6 @@
-//! Serves orders for coffee: collects it in the tea room, travels, rides the elevator, halts at the door, returns; when the way is
-//! blocked it waits, backs off, plans anew and at last asks for help (COF-001, COF-005, COF-133, X-28; note 2.4).
+//! Serves orders for coffee: collects it in the tea room, travels, rides the elevator, halts at the door,
+//! returns; when the way is blocked it waits, backs off, plans anew and at last asks for help (COF-001,
+//! COF-005, COF-133, X-28; note 2.4).
 
 mod building;
 mod docking;
@@ -26,11 +27,11 @@ use messages::{
 use std::time::Duration;
 use trouble::{Remedy, Watch};
 
-/// A mission status is published at least so often.
+/// The longest time from one mission status to the next.
 const STATUS_PERIOD_S: f64 = 0.2;
 /// Wheels, sightings and the guard's word are used when younger than this.
 const FRESH: Duration = Duration::from_millis(500);
-/// A remark about a refused order stands so long.
+/// How long a remark about a refused order stands.
 const NOTICE_S: f64 = 10.0;
 /// There may be a way when the robot looks from farther back.
 const NO_WAY: &str = "there is no way to the goal";
@@ -143,7 +144,7 @@ impl Navigator {
         Self::with_building(params, building)
     }
 
-    /// The same with the building given.
+    /// A navigator with the building given.
     ///
     /// # Errors
     /// When a parameter is out of range.
@@ -175,8 +176,8 @@ impl Navigator {
         self.kept.clone()
     }
 
-    /// Goes on from a snapshot: stage, orders and numbers are taken over, the present leg is planned anew. A room that this building
-    /// does not have any more ends its order.
+    /// Goes on from a snapshot: stage, orders and numbers are taken over, the present leg is planned anew. A
+    /// room that this building does not have any more ends its order.
     pub fn restore(&mut self, snapshot: &Snapshot) {
         self.kept = snapshot.clone();
         (self.stage_since, self.ride_since, self.request, self.docking) = (None, None, None, None);

@@ -1,4 +1,5 @@
-//! The process around `navigator`. What a delivery needs to go on is kept before anything is said, so that a successor goes on with it.
+//! The process around `navigator`. What a delivery needs to go on is kept before anything is said, so that a
+//! successor goes on with it.
 use board::News;
 use messages::{
     AppliedWheels, Clearance, DoorSighting, DriveCommand, ElevatorCall, ElevatorState, MissionStatus, Order,

@@ -49,7 +49,8 @@ pub enum Ride {
     Leaving,
 }
 
-/// All that a navigator has to know to go on with a delivery where another one, or its own process before it was killed, left off.
+/// All that a navigator has to know to go on with a delivery where another one, or its own process before it
+/// was killed, left off.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Snapshot {
     /// Orders, past and waiting.

@@ -11,7 +11,7 @@ use messages::{CarState, DriveModeName, ElevatorCall, PlanRequest, PlanStateName
 const DELIVERED_S: f64 = 1.0;
 /// Facing the elevator within this angle is enough to drive in.
 const FACING_RAD: f64 = 0.15;
-/// A robot that stands so near to its goal for this long has arrived.
+/// A robot that stands near its goal for this long has arrived.
 const CLOSE_ENOUGH: (f64, f64) = (2.0, 2.0);
 /// The place before the elevator is reached within this share of the tolerance of other places.
 const BEFORE_ELEVATOR: f64 = 0.4;
@@ -113,7 +113,8 @@ impl Navigator {
         }
     }
 
-    /// The direction along the wall in which the door is passed: the one in which the robot comes, from the elevator on another floor.
+    /// The direction along the wall in which the door is passed: the one in which the robot comes, from the
+    /// elevator on another floor.
     fn passing_heading_rad(&self, senses: &Senses, door: Spot, into: [f64; 2]) -> f64 {
         let from = match &self.building.lift {
             Some(lift) if senses.floor != door.floor => lift.wait,
@@ -199,7 +200,8 @@ impl Navigator {
         Drive::Going(self.ride(senses, goal, &lift))
     }
 
-    /// The elevator's state machine: call, wait for an open car, drive in, call it to the other floor, wait there, drive out.
+    /// The elevator's state machine: call, wait for an open car, drive in, call it to the other floor, wait
+    /// there, drive out.
     fn ride(&mut self, senses: &Senses, goal: Spot, lift: &Lift) -> Wish {
         let now = senses.now;
         let waited_s = now.seconds_since(*self.ride_since.get_or_insert(now));
@@ -353,7 +355,8 @@ impl Navigator {
         if self.request.as_ref().is_some_and(same) {
             return;
         }
-        // The first number of a process lies above those of an earlier one, of whose last words no snapshot may tell.
+        // The first number of a process lies above those of an earlier one, of whose last words no snapshot
+        // may tell.
         let floor_id = if self.has_asked { 0 } else { senses.now.as_nanos() / 1_000_000 };
         self.has_asked = true;
         self.kept.request_id = (self.kept.request_id + 1).max(floor_id);

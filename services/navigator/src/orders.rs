@@ -1,4 +1,5 @@
-//! The queue of orders: every order counts, repeated numbers count once, impossible ones are refused with a remark.
+//! The queue of orders: every order counts, repeated numbers count once, impossible ones are refused with a
+//! remark.
 
 use crate::building::Building;
 use messages::{FixedText, Order, OrderReport, OrderStateName, Stamped, Time};
@@ -29,7 +30,8 @@ pub struct OrderBook {
     waiting: VecDeque<Job>,
     seen: VecDeque<u64>,
     own_numbers: u64,
-    /// Stamp and sequence of the last order read, so that the board's last message is not taken twice after a restart.
+    /// Stamp and sequence of the last order read, so that the board's last message is not taken twice after a
+    /// restart.
     last_read: (u64, u64),
     default_taken: bool,
 }

@@ -22,22 +22,23 @@ pub struct Params {
     /// The planner may end a path this far from a goal on which something stands.
     #[schemars(range(min = 0.0, max = 2.0))]
     pub goal_tolerance_m: f64,
-    /// So far before the door the path ends and the search for the door begins.
+    /// How far before the door the path ends and the search for the door begins.
     #[schemars(range(min = 0.3, max = 5.0))]
     pub approach_m: f64,
     /// Distance from a door on the right to the line on which the robot passes it.
     #[schemars(range(min = 0.3, max = 3.0))]
     pub right_door_m: f64,
-    /// The same for a door on the left: nearer than the lane, so that the side sensors see it well.
+    /// Distance from a door on the left to the line on which the robot passes it: nearer than the lane, so
+    /// that the side sensors see it well.
     #[schemars(range(min = 0.3, max = 3.0))]
     pub left_door_m: f64,
-    /// The robot halts with its middle so near to the door's centre line.
+    /// How near to the door's centre line the robot halts with its middle.
     #[schemars(range(min = 0.01, max = 0.5))]
     pub halt_tolerance_m: f64,
-    /// After the last correction this much is accepted.
+    /// The distance from the door's centre line that is accepted after the last correction.
     #[schemars(range(min = 0.01, max = 0.5))]
     pub halt_accept_m: f64,
-    /// So far past the door of the map the search for it ends, and the map decides.
+    /// How far past the map's place of the door the search for it ends, and the map decides.
     #[schemars(range(min = 0.1, max = 3.0))]
     pub overrun_m: f64,
     /// Sightings that disagree more than this with the map are not believed.
@@ -52,7 +53,7 @@ pub struct Params {
     /// Speed while searching the door.
     #[schemars(range(min = 0.02, max = 0.5))]
     pub creep_speed_mps: f64,
-    /// Least speed of the last centimetres.
+    /// The least speed on the last centimetres.
     #[schemars(range(min = 0.01, max = 0.2))]
     pub crawl_speed_mps: f64,
     /// Speed backwards.
@@ -70,13 +71,13 @@ pub struct Params {
     /// How long the robot waits at the door for the coffee to be taken.
     #[schemars(range(min = 0.0, max = 600.0))]
     pub dwell_s: f64,
-    /// A stop that lasts longer is a blocked way; a walker that passes is not.
+    /// A stop that lasts longer than this is a blocked way; a walker that passes is not.
     #[schemars(range(min = 0.5, max = 60.0))]
     pub blocked_after_s: f64,
     /// How long the robot backs off from an obstacle before it plans anew.
     #[schemars(range(min = 0.1, max = 10.0))]
     pub back_off_s: f64,
-    /// After so many blocked attempts without progress human help is asked for.
+    /// Blocked attempts without progress after which human help is asked for.
     #[schemars(range(min = 1, max = 100))]
     pub max_failures: u32,
     /// A fault is tried again after this time; zero for never.
@@ -85,7 +86,7 @@ pub struct Params {
     /// Without a pose younger than this the robot stands.
     #[schemars(range(min = 50, max = 10000))]
     pub pose_max_age_ms: u64,
-    /// The robot waits so far before the elevator's door.
+    /// How far before the elevator's door the robot waits.
     #[schemars(range(min = 0.3, max = 5.0))]
     pub elevator_wait_m: f64,
     /// An elevator that does not come in this time is called again.

@@ -1,4 +1,5 @@
-//! Noticing that the robot does not get on, and what is done about it: wait, back off and plan anew, ask for help.
+//! Noticing that the robot does not get on, and what is done about it: wait, back off and plan anew, ask for
+//! help.
 
 use crate::params::Params;
 use geometry::{Pose2, angle};
@@ -8,7 +9,7 @@ use messages::Time;
 const PROGRESS_M: f64 = 0.05;
 /// Turning less than this is standing.
 const PROGRESS_RAD: f64 = 0.15;
-/// After so much way the failures before are forgotten.
+/// After this much way the failures before are forgotten.
 const RECOVERED_M: f64 = 1.0;
 /// A stop is worth a word after this time.
 const WORTH_A_WORD_S: f64 = 2.0;

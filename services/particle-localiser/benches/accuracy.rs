@@ -1,8 +1,10 @@
-//! How often the localiser is right, and how far off: `cargo bench -p particle-localiser --bench accuracy` (three minutes).
+//! How often the localiser is right, and how far off: `cargo bench -p particle-localiser --bench accuracy`
+//! (three minutes).
 //!
-//! Laser drives are localised on the map of their own even scans, from raw odometry, and judged by the corrected poses. Logs that are not
-//! in `../shared/data` are left out; the drive in Málaga is part of the repository. The sonar starts anywhere in an arena, and looks three
-//! times at most; in the third arena, which repeats itself, it should know that it does not know.
+//! Laser drives are localised on the map of their own even scans, from raw odometry, and judged by the
+//! corrected poses. Logs that are not in `../shared/data` are left out; the drive in Málaga is part of the
+//! repository. The sonar starts anywhere in an arena, and looks three times at most; in the third arena,
+//! which repeats itself, it should know that it does not know.
 
 #[path = "../tests/support/mod.rs"]
 mod support;

@@ -1,7 +1,8 @@
 //! Milliseconds for an update, with its accuracy beside it: `cargo bench -p particle-localiser`.
 //!
-//! "weigh" is the measurement model alone; "update" is all of it: motion, model, weights, clusters, estimate, and the drawing of the next
-//! generation, while the pose is followed. One thread. The error is that of the last update's likeliest place.
+//! "weigh" is the measurement model alone; "update" is all of it: motion, model, weights, clusters, estimate,
+//! and the drawing of the next generation, while the pose is followed. One thread. The error is that of the
+//! last update's likeliest place.
 #![allow(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 
 use geometry::{Grid, GridFrame, Occupancy, OccupancyGrid, Pose2, angle};
@@ -151,7 +152,8 @@ fn main() {
     rays(&grid, &map);
 }
 
-/// Nanoseconds a ray of 12 m at most, and its error against the exact walk from cell to cell of `OccupancyGrid::cast_m`.
+/// Nanoseconds a ray of 12 m at most, and its error against the exact walk from cell to cell of
+/// `OccupancyGrid::cast_m`.
 fn rays(grid: &OccupancyGrid, map: &Map) {
     let params = Params { model: Model::Beam, range_max_m: 12.0, ..Params::default() };
     let weigher = Weigher::new(&params, map);

@@ -1,4 +1,5 @@
-//! From a scan to the readings that are used: invalid ones are dropped first, then the rest is thinned evenly.
+//! From a scan to the readings that are used: invalid ones are dropped first, then the rest is thinned
+//! evenly.
 
 use messages::RangeScan;
 
@@ -20,7 +21,8 @@ pub struct Beams {
 }
 
 impl Beams {
-    /// The valid readings below `range_max_m`, evenly thinned to `most`. A header that makes no sense leaves none.
+    /// The valid readings below `range_max_m`, evenly thinned to `most`. A header that makes no sense leaves
+    /// none.
     pub fn select(scan: &RangeScan, ranges: &[f32], range_max_m: f64, most: usize) -> Self {
         let mut beams = Self { dropped: ranges.len(), ..Self::default() };
         // Sensors sit on the robot.

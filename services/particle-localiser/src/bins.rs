@@ -27,7 +27,8 @@ impl Division {
     }
 }
 
-/// The whole number below. The standard library's is a call where the processor's oldest instructions are all that may be used.
+/// The whole number below. The standard library's is a call where the processor's oldest instructions are all
+/// that may be used.
 #[inline(always)]
 fn floor(number: f32) -> i32 {
     let whole = number as i32;

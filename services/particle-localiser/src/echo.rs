@@ -1,10 +1,12 @@
-//! What a turning ultrasonic sensor reads in an arena, and how likely each of its errors is: the model for cones among straight walls.
+//! What a turning ultrasonic sensor reads in an arena, and how likely each of its errors is: the model for
+//! cones among straight walls.
 //!
-//! Sound spreads as a cone, and the nearest thing within it answers (NXT-032). That is a wall where it faces the sensor, the end of a wall,
-//! or a wall where the edge of the cone cuts it; in the last case the sound meets it askew, and the more so, the later its echo is noticed,
-//! or it is lost and something farther away answers (NXT-033, NXT-034). A reading is compared with the nearest thing by a density that
-//! knows this: narrow where a wall faces the sensor, broad and one-sided where it is met askew. A narrow Gaussian for all would be too sure
-//! of the askew ones, a broad one wastes the others.
+//! Sound spreads as a cone, and the nearest thing within it answers (NXT-032). That is a wall where it faces
+//! the sensor, the end of a wall, or a wall where the edge of the cone cuts it; in the last case the sound
+//! meets it askew, and the more so, the later its echo is noticed, or it is lost and something farther away
+//! answers (NXT-033, NXT-034). A reading is compared with the nearest thing by a density that knows this:
+//! narrow where a wall faces the sensor, broad and one-sided where it is met askew. A narrow Gaussian for all
+//! would be too sure of the askew ones, a broad one wastes the others.
 
 #![allow(clippy::needless_range_loop, reason = "one lane of several arrays at a time")]
 
@@ -14,15 +16,15 @@ use crate::params::{Echoes, Params};
 use crate::{Beams, Particles};
 use geometry::{Point2, Segment, Vector2};
 
-/// Kinds of meetings, by the cosine of the angle of incidence ...
+/// Kinds of meetings, by the cosine of the angle of incidence.
 const KINDS: usize = 32;
-/// ... and one more for directions in which nothing is expected.
+/// The kind of meeting for directions in which nothing is expected: one more.
 const NOTHING: usize = KINDS;
-/// Differences between a reading and what was expected: columns of the table ...
+/// Columns of the table: differences between a reading and what was expected.
 const COLUMNS: usize = 512;
-/// ... each so wide ...
+/// Width of a column.
 const COLUMN_M: f64 = 0.004;
-/// ... beginning with readings that are so much too short.
+/// The difference at which the first column begins: readings that are too short.
 const SHORTEST_M: f64 = -0.448;
 /// Points of a perfect reading.
 const FULL: f64 = 255.0;
@@ -54,8 +56,9 @@ struct Line {
 #[derive(Debug, Clone, Copy)]
 struct End {
     at: [f32; 2],
-    /// The ways along the walls that meet there, the same one twice at a free end. A sensor between them looks into a corner, which sends
-    /// sound back wherever it comes from; any other looks at an edge, which scatters it, or hears the end of a wall that faces it.
+    /// The ways along the walls that meet there, the same one twice at a free end. A sensor between them
+    /// looks into a corner, which sends sound back wherever it comes from; any other looks at an edge, which
+    /// scatters it, or hears the end of a wall that faces it.
     arms: [[f32; 2]; 2],
 }
 
@@ -77,7 +80,8 @@ struct BlockView {
     things: Vec<Thing>,
 }
 
-/// A wall as seen from the particles of a block: the way to its first end, and that way's cross product with the wall.
+/// A wall as seen from the particles of a block: the way to its first end, and that way's cross product with
+/// the wall.
 #[derive(Debug, Clone, Copy)]
 struct SeenWall {
     u: Lanes,
@@ -148,7 +152,8 @@ impl EchoModel {
         expected
     }
 
-    /// Hands to `judge`, for each beam, the range of the nearest thing at each particle, and the cosine of the angle at which it is met.
+    /// Hands to `judge`, for each beam, the range of the nearest thing at each particle, and the cosine of
+    /// the angle at which it is met.
     pub(crate) fn expect(
         &self,
         [x, y, heading]: [&[f32]; 3],
@@ -174,8 +179,9 @@ impl EchoModel {
         self.look(view, direction, nearest_m, facing);
     }
 
-    /// The nearest thing within the cone around a direction, given as cosine and sine in the robot's frame: the edges of the cone against
-    /// every wall, then what faces the sensor within. Ranges along the edges are kept as fractions, for one division a beam.
+    /// The nearest thing within the cone around a direction, given as cosine and sine in the robot's frame:
+    /// the edges of the cone against every wall, then what faces the sensor within. Ranges along the edges
+    /// are kept as fractions, for one division a beam.
     fn look(&self, view: &BlockView, direction: [f32; 2], nearest_m: &mut Lanes, facing: &mut Lanes) {
         let [middle, left, right] = self.rays(view, direction);
         for lane in 0..LANES {
@@ -206,7 +212,7 @@ impl EchoModel {
         }
     }
 
-    /// The same for eight particles at a time, bit for bit.
+    /// What `look` finds, for eight particles at a time and equal bit for bit.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     fn look_avx2(&self, view: &BlockView, direction: [f32; 2], nearest_m: &mut Lanes, facing: &mut Lanes) {
@@ -360,7 +366,8 @@ impl EchoModel {
         self.table[self.index(1.0 + difference_m, 1.0, facing)]
     }
 
-    /// The probability of all differences that the table knows, where a reading without points has the density `worst`.
+    /// The probability of all differences that the table knows, where a reading without points has the
+    /// density `worst`.
     pub(crate) fn mass(&self, facing: f32, nats: f64, worst: f64) -> f64 {
         let density = |column: usize| {
             let difference_m = SHORTEST_M + (column as f64 + 0.5) * COLUMN_M;
@@ -429,12 +436,14 @@ fn table(params: &Params) -> (Vec<u8>, f64) {
     (logs.iter().map(|log| (FULL * (log - worst) / nats).round() as u8).collect(), nats)
 }
 
-/// Density of an echo that is so much longer than the way: noise, and a delay that is half of a normal number of size `late_m`.
+/// Density of an echo that is so much longer than the way: noise, and a delay that is half of a normal number
+/// of size `late_m`.
 fn heard(difference_m: f64, sigma_m: f64, late_m: f64) -> f64 {
     let normal = |value: f64, sigma: f64| {
         (-0.5 * (value / sigma).powi(2)).exp() / (sigma * std::f64::consts::TAU.sqrt())
     };
-    // Delays, from none to four times their size; those that lie too far from the difference to matter are left out.
+    // Delays, from none to four times their size; those that lie too far from the difference to matter are
+    // left out.
     let (mut sum, mut mass) = (0.0, 0.0);
     for step in 0..DELAYS {
         let delay = (step as f64 + 0.5) / DELAYS as f64 * 4.0;

@@ -1,8 +1,9 @@
-//! How likely each of several places is, after a search of the whole map: the evidence of each cluster by importance sampling, in two
-//! rounds of which the second draws from what the first has found (population Monte Carlo, Cappé et al. 2004).
+//! How likely each of several places is, after a search of the whole map: the evidence of each cluster by
+//! importance sampling, in two rounds of which the second draws from what the first has found (population
+//! Monte Carlo, Cappé et al. 2004).
 //!
-//! The weight that a cluster has gathered in the search depends on how near to its peak one of the scattered particles lay, which is chance.
-//! Places that are alike to the last reading must come out alike.
+//! The weight that a cluster has gathered in the search depends on how near to its peak one of the scattered
+//! particles lay, which is chance. Places that are alike to the last reading must come out alike.
 
 use crate::clusters::Cluster;
 use crate::random::{Purpose, Stream};
@@ -12,7 +13,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Rounds for each cluster.
 const ROUNDS: u64 = 2;
-/// The particles are drawn so much wider than the cluster is, so that nothing of it is missed.
+/// How much wider than the cluster is the particles are drawn, so that nothing of it is missed.
 const WIDER: f64 = 1.5;
 
 /// What one cluster is drawn from.
@@ -22,15 +23,16 @@ struct Proposal {
     covariance: Matrix3<f64>,
 }
 
-/// A cluster drawn anew: particles, and the logarithm of each one's likelihood by its density; their mean is the evidence.
+/// A cluster drawn anew: particles, and the logarithm of each one's likelihood by its density; their mean is
+/// the evidence.
 #[derive(Debug, Default)]
 pub(crate) struct Sampled {
     pub(crate) particles: Particles,
     pub(crate) log_weights: Vec<f64>,
 }
 
-/// Draws `count` particles for a cluster. `least` are standard deviations of place and heading below which nothing is told apart. `None`
-/// for a cluster without an extent that makes sense.
+/// Draws `count` particles for a cluster. `least` are standard deviations of place and heading below which
+/// nothing is told apart. `None` for a cluster without an extent that makes sense.
 pub(crate) fn sample(
     weigher: &Weigher,
     beams: &Beams,

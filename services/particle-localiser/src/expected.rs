@@ -1,4 +1,5 @@
-//! Expected ranges: what a sensor at each of sixteen particles would read, along the walls' lines or over the cells of a grid.
+//! Expected ranges: what a sensor at each of sixteen particles would read, along the walls' lines or over the
+//! cells of a grid.
 
 use crate::field::{Block, ByteField, LANES};
 use geometry::{Grid, Segment};
@@ -22,7 +23,8 @@ pub(crate) struct Line {
     along: [f32; 2],
 }
 
-/// A cell's distance is measured from its middle to a wall cell's middle: from any point to any point it is shorter by this.
+/// A cell's distance is measured from its middle to a wall cell's middle: from any point to any point it is
+/// shorter by this.
 const MIDDLES: f32 = std::f32::consts::SQRT_2;
 /// Steps are stored in quarters of a cell.
 const QUARTERS: f32 = 4.0;
@@ -59,7 +61,8 @@ impl Caster {
         block
     }
 
-    /// For each direction (cosine and sine in the robot's frame) the range at each particle, at most `most_m`.
+    /// For each direction (cosine and sine in the robot's frame) the range at each particle, at most
+    /// `most_m`.
     pub(crate) fn cast(&self, block: &Block, directions: &[[f32; 2]], most_m: f32, ranges: &mut Vec<Lanes>) {
         ranges.clear();
         ranges.resize(directions.len(), [most_m; LANES]);
@@ -133,7 +136,8 @@ fn meet(lines: &[Line], block: &Block, du: &Lanes, dv: &Lanes, ranges: &mut Lane
 /// From the edge of a wall's cell to its middle, which is where the map's wall is on average.
 const INTO_WALL: f32 = 0.5;
 
-/// Of rays that ended after `along` cells: the exact range to the edge of the cell in which they did, and into the wall; in metres.
+/// Of rays that ended after `along` cells: the exact range to the edge of the cell in which they did, and
+/// into the wall; in metres.
 #[inline(always)]
 fn arrive(
     block: &Block,

@@ -1,7 +1,8 @@
 //! Grids of one byte a cell, and their look-up for many particles at once.
 //!
-//! A likelihood field says of each cell how likely a beam ends there, in 255 steps: sums over beams are sums of whole numbers, exact in
-//! any order, and four to eight times as much of the map lies in the cache as with single precision.
+//! A likelihood field says of each cell how likely a beam ends there, in 255 steps: sums over beams are sums
+//! of whole numbers, exact in any order, and four to eight times as much of the map lies in the cache as with
+//! single precision.
 
 #![allow(clippy::needless_range_loop, reason = "one lane of several arrays at a time")]
 
@@ -22,7 +23,7 @@ pub(crate) struct ByteField {
     pub(crate) per_metre: f32,
 }
 
-/// A look-up reads so many bytes more than its cell.
+/// How many bytes more than its cell a look-up reads.
 const READ_AHEAD: usize = 3;
 
 /// The poses of a block of particles in cells of a field, with the sines and cosines of their headings.
@@ -64,7 +65,8 @@ impl Block {
 impl ByteField {
     /// `value` of each cell's distance from the nearest wall, `outside` around the map.
     ///
-    /// Each cell of the map becomes `fineness` x `fineness` cells whose distances are interpolated between the middles of the map's.
+    /// Each cell of the map becomes `fineness` x `fineness` cells whose distances are interpolated between
+    /// the middles of the map's.
     pub(crate) fn new(
         distances_m: &Grid<f32>,
         fineness: usize,
@@ -104,8 +106,8 @@ impl ByteField {
         self.cells.len()
     }
 
-    /// Adds up, for each particle, the bytes of the cells in which the beams end. `ends_u` and `ends_v` are the beams' ends in the
-    /// robot's frame, in cells of this field.
+    /// Adds up, for each particle, the bytes of the cells in which the beams end. `ends_u` and `ends_v` are
+    /// the beams' ends in the robot's frame, in cells of this field.
     pub(crate) fn sums(&self, poses: [&[f32]; 3], ends_u: &[f32], ends_v: &[f32], sums: &mut [u32]) {
         let [x, y, heading] = poses;
         let blocks =
@@ -123,7 +125,7 @@ impl ByteField {
         }
     }
 
-    /// The same for up to sixteen particles in plain arithmetic.
+    /// The sums of up to sixteen particles, in plain arithmetic.
     pub(crate) fn block_sums(
         &self,
         [x, y, heading]: [&[f32]; 3],
@@ -225,7 +227,8 @@ impl Avx2View {
         let column = _mm256_cvttps_epi32(_mm256_min_ps(_mm256_max_ps(u, zero), self.last[0]));
         let row = _mm256_cvttps_epi32(_mm256_min_ps(_mm256_max_ps(v, zero), self.last[1]));
         let index = _mm256_add_epi32(_mm256_mullo_epi32(row, self.stride), column);
-        // SAFETY: columns and rows are clamped to those of the field, which has three bytes more than its last cell.
+        // SAFETY: columns and rows are clamped to those of the field, which has three bytes more than its
+        // last cell.
         let words = unsafe { _mm256_i32gather_epi32::<1>(self.cells.cast(), index) };
         _mm256_and_si256(words, _mm256_set1_epi32(0xff))
     }

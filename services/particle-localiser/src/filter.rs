@@ -1,9 +1,10 @@
 //! The filter itself: particles are moved, weighed, drawn anew and scattered. It knows no messages.
 //!
-//! Monte Carlo localisation (Fox et al. 1999) with these changes: one scan is taken in by several passes, each of which sharpens the
-//! belief only so far that enough particles stay effective (annealing, after Deutscher et al. 2000); the number of particles follows the
-//! belief (Fox 2003) and a bound of the work; a start without a pose, and the recovery of a robot that was carried away, search the whole
-//! map by the same passes.
+//! Monte Carlo localisation (Fox et al. 1999) with these changes: one scan is taken in by several passes,
+//! each of which sharpens the belief only so far that enough particles stay effective (annealing, after
+//! Deutscher et al. 2000); the number of particles follows the belief (Fox 2003) and a bound of the work; a
+//! start without a pose, and the recovery of a robot that was carried away, search the whole map by the same
+//! passes.
 
 use crate::bins::Division;
 use crate::clusters::{Cluster, Finder};
@@ -105,7 +106,8 @@ const CANDIDATE_CLUSTERS: usize = 12;
 const LEAST_SHARE: f64 = 1e-4;
 /// Fewest candidates for the particles that are scattered to recover.
 const CANDIDATES: usize = 2000;
-/// Weight of all scattered particles together, for each unit of their share: one scan may fit a mirrored place better by chance, several may not.
+/// Weight of all scattered particles together, for each unit of their share: one scan may fit a mirrored
+/// place better by chance, several may not.
 const SCATTERED_PRIOR: f64 = 1e-6;
 /// From one pass to the next the spread shrinks to this.
 const SHRINK: f64 = 0.6;
@@ -115,7 +117,8 @@ const APART: f64 = 0.4;
 const DIRECTIONS: f64 = 16.0;
 
 impl Filter {
-    /// A filter that begins at the start of the parameters or, without one, everywhere. The parameters have been checked.
+    /// A filter that begins at the start of the parameters or, without one, everywhere. The parameters have
+    /// been checked.
     pub fn new(params: Params, map: Map, seed: u64) -> Self {
         let weigher = Weigher::new(&params, &map);
         let division = Division::new(params.bin_m, params.bin_rad);
@@ -173,7 +176,7 @@ impl Filter {
         self.averages = Averages::default();
     }
 
-    /// The belief in at most so many particles, each cluster with its share; `None` when there is none.
+    /// The belief in at most `most` particles, each cluster with its share; `None` when there is none.
     pub(crate) fn belief(&self, most: usize) -> Option<Belief> {
         let (all, count) = (&self.particles, self.particles.len().min(most));
         let mut particles = Vec::with_capacity(count);
@@ -189,7 +192,8 @@ impl Filter {
         })
     }
 
-    /// Takes over a belief, on a map that may have another frame, and tells its clusters. `None`, and nothing is changed, when it is none.
+    /// Takes over a belief, on a map that may have another frame, and tells its clusters. `None`, and nothing
+    /// is changed, when it is invalid.
     pub(crate) fn take_over(&mut self, belief: &Belief) -> Option<Vec<Cluster>> {
         let Belief { origin: [x_m, y_m, heading_rad], ref particles, spread, averages, searches, epoch } =
             *belief;
@@ -318,8 +322,8 @@ impl Filter {
         particles.weight.iter_mut().for_each(|weight| *weight /= total);
     }
 
-    /// Draws the next generation when the particles have become too unequal or too many, with scattered ones among them when the scans
-    /// have ceased to fit. Returns how many were scattered.
+    /// Draws the next generation when the particles have become too unequal or too many, with scattered ones
+    /// among them when the scans have ceased to fit. Returns how many were scattered.
     fn renew(&mut self, beams: &Beams, effective: f64, wanted: usize, budget: &mut Budget) -> usize {
         let (fewest, most) = (self.params.min_particles as usize, self.params.max_particles as usize);
         let count = wanted.clamp(fewest, most);
@@ -338,7 +342,8 @@ impl Filter {
             self.draw(count);
             return 0;
         }
-        // A robot that is surely lost searches as thoroughly as at a start without a pose; one that may be lost, less so.
+        // A robot that is surely lost searches as thoroughly as at a start without a pose; one that may be
+        // lost, less so.
         let thoroughness = share / recovery.most_scattered.max(f64::MIN_POSITIVE);
         let thorough = (thoroughness * f64::from(self.params.global_particles)) as usize;
         let candidates = budget.affordable(thorough.max(CANDIDATES).max(scattered), beams.len());
@@ -353,7 +358,8 @@ impl Filter {
         let particles = &mut self.particles;
         let kept = particles.len();
         comb(&others.weight, scattered, self.seed, self.epoch, |index| particles.push(others.pose(index)));
-        // The scattered ones begin with little weight: they must fit much better to take over, not just as well.
+        // The scattered ones begin with little weight: they must fit much better to take over, not just as
+        // well.
         let prior = SCATTERED_PRIOR * share;
         let all = particles.len();
         for (index, weight) in particles.weight.iter_mut().enumerate() {
@@ -395,8 +401,8 @@ impl Filter {
         (particles, spread)
     }
 
-    /// How many particles the belief needs: as many as its spread over bins asks for, when as many are drawn as there are now. The bins are
-    /// those in which clusters were found last.
+    /// How many particles the belief needs: as many as its spread over bins asks for, when as many are drawn
+    /// as there are now. The bins are those in which clusters were found last.
     fn wanted(&mut self) -> usize {
         let Self { finder, particles, is_hit, .. } = self;
         is_hit.clear();
@@ -409,8 +415,9 @@ impl Filter {
         kld::enough(hit, self.params.kld_error, self.params.kld_quantile)
     }
 
-    /// Weighs particles by a scan in passes. Each pass uses up as much of the scan's likelihood, as an exponent, as leaves enough
-    /// particles effective; what is then left is for the next pass, after these have been drawn anew and moved a little.
+    /// Weighs particles by a scan in passes. Each pass uses up as much of the scan's likelihood, as an
+    /// exponent, as leaves enough particles effective; what is then left is for the next pass, after these
+    /// have been drawn anew and moved a little.
     fn anneal(
         &mut self,
         particles: &mut Particles,

@@ -1,7 +1,8 @@
-//! How many particles are enough (Fox 2003, "Adapting the sample size in particle filters through KLD-sampling").
+//! How many particles are enough (Fox 2003, "Adapting the sample size in particle filters through
+//! KLD-sampling").
 
-/// Particles with which the belief's distance from the true one over `bins` occupied bins stays below `error` with the probability that
-/// belongs to the upper normal quantile `quantile` (equation 7 there).
+/// Particles with which the belief's distance from the true one over `bins` occupied bins stays below `error`
+/// with the probability that belongs to the upper normal quantile `quantile` (equation 7 there).
 pub fn enough(bins: usize, error: f64, quantile: f64) -> usize {
     if bins <= 1 {
         return 1;

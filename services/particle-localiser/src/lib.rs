@@ -1,5 +1,6 @@
-//! Where the robot is on a map: one Monte Carlo localiser for lasers on grids and ultrasonic cones in arenas (Fox et al. 1999; NXT-050 to
-//! NXT-060). It starts without a pose, follows the odometry, corrects by scans, and notices when the robot has been carried away.
+//! Where the robot is on a map: one Monte Carlo localiser for lasers on grids and ultrasonic cones in arenas
+//! (Fox et al. 1999; NXT-050 to NXT-060). It starts without a pose, follows the odometry, corrects by scans,
+//! and notices when the robot has been carried away.
 
 mod beams;
 mod bins;
@@ -82,7 +83,7 @@ pub struct ParticleLocaliser {
 /// Below this part of the weight the best place is a guess among several.
 const DOUBTFUL_SHARE: f64 = 0.5;
 
-/// A scan that fits so much worse than usual is a sign that something is wrong.
+/// How much worse than usual a scan must fit to be a sign that something is wrong.
 const DOUBTFUL_FIT: f64 = 0.7;
 
 impl ParticleLocaliser {
@@ -190,7 +191,8 @@ impl ParticleLocaliser {
         }
     }
 
-    /// The part of the weight that lies at the likeliest place: clusters so near to each other that they share a bin are one place.
+    /// The part of the weight that lies at the likeliest place: clusters so near to each other that they
+    /// share a bin are one place.
     fn share_of_place(&self, update: &Update) -> f64 {
         let Some(best) = update.clusters.first() else { return 0.0 };
         let Params { bin_m, bin_rad, .. } = self.params;

@@ -26,7 +26,8 @@ fn main() -> ExitCode {
             localiser.restore(&snapshot);
         }
         Ok(move |now| {
-            // In the order of their publication: which odometry belongs to a scan must not depend on when this process is woken.
+            // In the order of their publication: which odometry belongs to a scan must not depend on when
+            // this process is woken.
             let (mut way, mut scan) = (odometry.next(), scans.next());
             loop {
                 let is_scan = match (&way, &scan) {

@@ -1,5 +1,6 @@
-//! The motion model: particles follow the odometry, each with an error of its own (after Thrun et al. 2005, table 5.6, with the errors
-//! along, across and in heading instead of two turns and a distance, which need no direction of travel).
+//! The motion model: particles follow the odometry, each with an error of its own (after Thrun et al. 2005,
+//! table 5.6, with the errors along, across and in heading instead of two turns and a distance, which need no
+//! direction of travel).
 
 use crate::Particles;
 use crate::params::MotionNoise;

@@ -19,17 +19,19 @@ pub enum Sensor {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Model {
-    /// Distance of each beam's end from the nearest wall, likelihoods multiplied (Thrun et al. 2005, table 6.3).
+    /// Distance of each beam's end from the nearest wall, likelihoods multiplied (Thrun et al. 2005, table
+    /// 6.3).
     #[default]
     LogProduct,
-    /// The same, with the sum of the likelihoods' cubes: blunt, and patient with what the map does not know.
+    /// Distance of each beam's end from the nearest wall, the cubes of the likelihoods summed: blunt, and
+    /// patient with what the map does not know.
     LikelihoodField,
     /// Each beam's range against the expected one: hit, short, random (Thrun et al. 2005, table 6.1).
     Beam,
     /// Each reading against the expected one by a Gaussian (NXT-057), each reading clipped.
     Gaussian,
-    /// Each reading of a cone against the nearest wall within, by a density that knows how echoes err (NXT-032 to NXT-034). For maps whose
-    /// walls are lines: world files.
+    /// Each reading of a cone against the nearest wall within, by a density that knows how echoes err
+    /// (NXT-032 to NXT-034). For maps whose walls are lines: world files.
     Echo,
 }
 
@@ -37,25 +39,26 @@ pub enum Model {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Echoes {
-    /// An echo is noticed late by about this and the squared tangent of the angle of incidence ...
+    /// An echo is noticed late by about this times the squared tangent of the angle of incidence, up to
+    /// `latest_m`.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub late_m: f64,
-    /// ... but by no more than this.
+    /// The most by which an echo is noticed late.
     #[schemars(range(min = 0.0, max = 5.0))]
     pub latest_m: f64,
-    /// From this angle of incidence on echoes begin to be lost ...
+    /// Angle of incidence from which echoes begin to be lost.
     #[schemars(range(min = 0.0, max = 1.57))]
     pub lost_from_rad: f64,
-    /// ... and from this one on as many are as ever.
+    /// Angle of incidence from which `lost_share` of the echoes is lost.
     #[schemars(range(min = 0.0, max = 1.58))]
     pub lost_to_rad: f64,
-    /// The share that is lost there, so that something else answers.
+    /// The share of echoes that is lost from `lost_to_rad` on, so that something else answers.
     #[schemars(range(min = 0.0, max = 0.95))]
     pub lost_share: f64,
-    /// The share that is lost wherever a wall is met, at least.
+    /// The least share of echoes that is lost wherever a wall is met.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub lost_least: f64,
-    /// How much farther away what answers instead is, on average.
+    /// How much farther away, on average, the thing is that answers instead of a lost echo.
     #[schemars(range(min = 0.01, max = 100.0))]
     pub detour_m: f64,
     /// An edge is heard as well as a wall that is met at this angle. Corners are heard well.
@@ -128,10 +131,11 @@ pub struct Recovery {
     /// The fast average may lie below the slow one by this share before particles are scattered.
     #[schemars(range(min = 0.0, max = 0.9))]
     pub tolerance: f64,
-    /// No larger share of the particles is scattered at once; 0 turns recovery off.
+    /// The largest share of the particles that is scattered at once; 0 turns recovery off.
     #[schemars(range(min = 0.0, max = 0.9))]
     pub most_scattered: f64,
-    /// For so many scans after a start without a pose the whole map is searched on, beside what has been found.
+    /// Scans after a start without a pose during which the whole map is still searched, beside what has been
+    /// found.
     #[schemars(range(min = 0, max = 10000))]
     pub early_scans: u32,
 }
@@ -177,7 +181,8 @@ fn start_sigma_rad() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
-    /// Map of the kind of ROS (the YAML file), or a world file (`.toml`); empty for none, and then no pose is ever found.
+    /// Map of the kind of ROS (the YAML file), or a world file (`.toml`); empty for none, and then no pose is
+    /// ever found.
     #[schemars(extend("format" = "path"))]
     pub map: String,
     /// World file used instead of a map; empty for none.
@@ -195,16 +200,17 @@ pub struct Params {
     pub sensor: Sensor,
     /// How a scan is compared with the map.
     pub model: Model,
-    /// Half of the opening angle within which the sensor reports the nearest; 0 for a ray. For the models that expect ranges.
+    /// Half of the opening angle within which the sensor reports the nearest; 0 for a ray. For the models
+    /// that expect ranges.
     #[schemars(range(min = 0.0, max = 0.8))]
     pub cone_half_width_rad: f64,
-    /// From one ray of the cone to the next.
+    /// Angle from one ray of the cone to the next.
     #[schemars(range(min = 0.001, max = 0.5))]
     pub cone_step_rad: f64,
     /// Readings of a scan that are used, evenly over the valid ones.
     #[schemars(range(min = 1, max = 4096))]
     pub beams: u32,
-    /// Readings from here on are left out, and no ray is followed farther.
+    /// Readings of at least this are left out, and no ray is followed farther.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub range_max_m: f64,
     /// Standard deviation of a reading, the map's error included.
@@ -216,34 +222,35 @@ pub struct Params {
     /// Share of readings cut short by what the map does not know. Beam model.
     #[schemars(range(min = 0.0, max = 0.9))]
     pub short_share: f64,
-    /// A reading counts for no more than that many standard deviations. Gaussian model.
+    /// The most standard deviations for which a reading counts. Gaussian model.
     #[schemars(range(min = 0.5, max = 20.0))]
     pub clip_sigmas: f64,
     /// How echoes err. Echo model.
     pub echoes: Echoes,
-    /// So many independent readings a scan is worth at most: neighbouring beams err alike.
+    /// The most independent readings that a scan is worth: neighbouring beams err alike.
     #[schemars(range(min = 0.5, max = 4096.0))]
     pub independent_beams: f64,
-    /// Fewest particles.
+    /// The fewest particles.
     #[schemars(range(min = 10, max = 1000000))]
     pub min_particles: u32,
-    /// Most particles while the pose is followed; half as many more while several places are kept apart.
+    /// The most particles while the pose is followed; half as many more while several places are kept apart.
     #[schemars(range(min = 10, max = 1000000))]
     pub max_particles: u32,
-    /// Beams that the first passes of a search of the whole map look at, evenly over all: there are many particles then, and little of what
-    /// a scan tells is used.
+    /// Beams that the first passes of a search of the whole map look at, evenly over all: there are many
+    /// particles then, and little of what a scan tells is used.
     #[schemars(range(min = 1, max = 4096))]
     pub search_beams: u32,
     /// Particles of a start without a pose.
     #[schemars(range(min = 10, max = 4000000))]
     pub global_particles: u32,
-    /// Bound of an update: particles times beams times passes. Below what the particles need, their number is lowered, and the cloud says
-    /// so; 0 for no bound.
+    /// Bound of an update: particles times beams times passes. Below what the particles need, their number is
+    /// lowered, and the cloud says so; 0 for no bound.
     pub budget_particle_beams: u64,
-    /// Passes over one scan at most: each sharpens the belief a little, so that few particles suffice for a scan that tells much.
+    /// The most passes over one scan: each sharpens the belief a little, so that few particles suffice for a
+    /// scan that tells much.
     #[schemars(range(min = 1, max = 50))]
     pub max_passes: u32,
-    /// A pass sharpens the belief until so large a share of the particles is still effective.
+    /// A pass sharpens the belief until only this share of the particles is still effective.
     #[schemars(range(min = 0.01, max = 0.9))]
     pub pass_effective_share: f64,
     /// Particles are drawn anew when a smaller share of them is effective.
@@ -258,21 +265,22 @@ pub struct Params {
     /// Side of the bins in which particles are counted and clusters are found.
     #[schemars(range(min = 0.005, max = 5.0))]
     pub bin_m: f64,
-    /// The same for headings.
+    /// Width in heading of the bins in which particles are counted and clusters are found.
     #[schemars(range(min = 0.01, max = 3.2))]
     pub bin_rad: f64,
     /// Errors of the odometry.
     pub motion: MotionNoise,
-    /// Noise that keeps drawn particles apart, at least.
+    /// The least noise of places that keeps drawn particles apart.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub jitter_m: f64,
-    /// The same for headings.
+    /// The least noise of headings that keeps drawn particles apart.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub jitter_rad: f64,
-    /// A scan is used after so much travel since the last one that was ...
+    /// A scan is used after this much travel since the last one that was used, or after `update_turn_rad`.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub update_distance_m: f64,
-    /// ... or after so much turning. With both 0 every scan is used.
+    /// A scan is used after this much turning since the last one that was used, or after `update_distance_m`.
+    /// With both 0 every scan is used.
     #[schemars(range(min = 0.0, max = 3.2))]
     pub update_turn_rad: f64,
     /// Odometry that jumps farther from one message to the next has begun anew.
@@ -282,13 +290,16 @@ pub struct Params {
     pub start: Option<Start>,
     /// Recovery of a robot that was carried away.
     pub recovery: Recovery,
-    /// The pose counts as found when its standard deviations lie below this ...
+    /// The pose counts as found when the standard deviation of its place lies below this, and
+    /// `found_sigma_rad` and `found_share` hold too.
     #[schemars(range(min = 0.001, max = 10.0))]
     pub found_sigma_m: f64,
-    /// ... and this ...
+    /// The pose counts as found when the standard deviation of its heading lies below this, and
+    /// `found_sigma_m` and `found_share` hold too.
     #[schemars(range(min = 0.001, max = 3.2))]
     pub found_sigma_rad: f64,
-    /// ... and when its cluster holds so much of the weight.
+    /// The pose counts as found when its cluster holds at least this share of the weight, and `found_sigma_m`
+    /// and `found_sigma_rad` hold too.
     #[schemars(range(min = 0.1, max = 1.0))]
     pub found_share: f64,
     /// Threads that weigh the particles; the result does not depend on it.
@@ -297,7 +308,7 @@ pub struct Params {
     /// Time from one message with the particles to the next; 0 for none.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub cloud_period_s: f64,
-    /// Particles in such a message at most.
+    /// The most particles in a message that shows them.
     #[schemars(range(min = 1, max = 100000))]
     pub cloud_particles: u32,
 }

@@ -1,9 +1,11 @@
-//! The particles: candidates for the robot's pose, component by component, so that eight of them fill a vector register.
+//! The particles: candidates for the robot's pose, component by component, so that eight of them fill a
+//! vector register.
 
 use crate::random::{Purpose, Stream};
 use crate::trigonometry::wrap;
 
-/// Candidate poses with weights. Places are in metres in the map's own frame (see [`crate::Map`]), headings in [-π, π].
+/// Candidate poses with weights. Places are in metres in the map's own frame (see [`crate::Map`]), headings
+/// in [-π, π].
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Particles {
     /// Place along the map's rows.

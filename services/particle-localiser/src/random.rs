@@ -1,5 +1,5 @@
-//! Random numbers by counting: the number of a particle depends on the seed, the update and the particle's index only, so it does not
-//! matter which thread asks, or in which order.
+//! Random numbers by counting: the number of a particle depends on the seed, the update and the particle's
+//! index only, so it does not matter which thread asks, or in which order.
 
 /// The numbers of one purpose in one update.
 #[derive(Debug, Clone, Copy)]
@@ -47,8 +47,8 @@ impl Stream {
         (self.bits(index, lane) >> 40) as f32 * (1.0 / 16_777_216.0)
     }
 
-    /// Mean 0, standard deviation 1: the sum of eight uniform numbers, which ends at 4.9 standard deviations. Uses the lanes `2 lane` and
-    /// `2 lane + 1`: there are four of them.
+    /// Mean 0, standard deviation 1: the sum of eight uniform numbers, which ends at 4.9 standard deviations.
+    /// Uses the lanes `2 lane` and `2 lane + 1`: there are four of them.
     #[inline(always)]
     pub(crate) fn normal(self, index: usize, lane: u64) -> f32 {
         let sum =

@@ -1,4 +1,5 @@
-//! Likelihoods relative to the best one, of points that are whole numbers: two short tables in the place of an exponential a particle.
+//! Likelihoods relative to the best one, of points that are whole numbers: two short tables in the place of
+//! an exponential a particle.
 
 /// Likelihood ratios to a power, by points.
 #[derive(Debug)]
@@ -18,7 +19,7 @@ enum Kind {
 const LOW: u32 = 256;
 
 impl Ratios {
-    /// Each point is worth so many nats.
+    /// How many nats a point is worth.
     pub(crate) fn of_logs(best: u32, nats_per_point: f64) -> Self {
         let power = |points: u32| (-nats_per_point * f64::from(points)).exp();
         let low = (0..LOW).map(power).collect();

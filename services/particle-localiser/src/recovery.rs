@@ -1,4 +1,5 @@
-//! Has the robot been carried away? A slow and a fast average of how well the scans fit (Thrun et al. 2005, table 8.3).
+//! Has the robot been carried away? A slow and a fast average of how well the scans fit (Thrun et al. 2005,
+//! table 8.3).
 
 use crate::params::Recovery;
 use serde::{Deserialize, Serialize};

@@ -31,8 +31,9 @@ pub(crate) fn resample(from: &Particles, into: &mut Particles, count: usize, see
     into.level();
 }
 
-/// Groups that are drawn from separately, so that none dies by chance: places that are alike must stay alike until the robot has moved
-/// (after Vermaak et al. 2003, "Maintaining multi-modality through mixture tracking").
+/// Groups that are drawn from separately, so that none dies by chance: places that are alike must stay alike
+/// until the robot has moved (after Vermaak et al. 2003, "Maintaining multi-modality through mixture
+/// tracking").
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Apart {
     /// No more than this, the heaviest.
@@ -46,11 +47,13 @@ pub(crate) const CLUSTERS: Apart = Apart { most: 12, least_share: 0.005 };
 /// The bins of a search: of a place that will fit, too little may be known yet to call it a cluster.
 pub(crate) const BINS: Apart = Apart { most: 64, least_share: 0.0 };
 
-/// No group gets less than its even part of so large a part of the particles, so that each is judged by enough of them.
+/// The share of the particles of which no group gets less than its even part, so that each is judged by
+/// enough of them.
 const EVEN: f64 = 0.5;
 
-/// Draws `count` particles, and up to half as many more where light groups are kept apart: the heavy ones need theirs. A light group gets
-/// more particles than its share, which weigh less. `ranks` says for each particle in which group it lies, 0 for the heaviest.
+/// Draws `count` particles, and up to half as many more where light groups are kept apart: the heavy ones
+/// need theirs. A light group gets more particles than its share, which weigh less. `ranks` says for each
+/// particle in which group it lies, 0 for the heaviest.
 pub(crate) fn resample_apart(
     from: &Particles,
     into: &mut Particles,

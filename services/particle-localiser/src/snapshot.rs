@@ -1,5 +1,5 @@
-//! What a successor needs to go on where its predecessor was, after a crash or in a swap: the belief as a thinned set of particles, and
-//! where the odometry stood.
+//! What a successor needs to go on where its predecessor was, after a crash or in a swap: the belief as a
+//! thinned set of particles, and where the odometry stood.
 
 use crate::filter::Belief;
 use crate::{Travel, Update};
@@ -60,8 +60,8 @@ impl crate::ParticleLocaliser {
         })
     }
 
-    /// Takes over the belief of a predecessor, before the first step. Odometry tells how far the robot went meanwhile. A state that is none
-    /// is left alone.
+    /// Takes over the belief of a predecessor, before the first step. Odometry tells how far the robot went
+    /// meanwhile. An invalid state is left alone.
     pub fn restore(&mut self, snapshot: &Snapshot) {
         if !snapshot.is_sound() {
             return;

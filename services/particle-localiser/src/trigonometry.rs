@@ -1,9 +1,10 @@
-//! Sine and cosine in single precision as plain arithmetic, which the compiler computes for eight particles at once, with the same bits
-//! on every machine.
+//! Sine and cosine in single precision as plain arithmetic, which the compiler computes for eight particles
+//! at once, with the same bits on every machine.
 
 use std::f32::consts::{FRAC_2_PI, TAU};
 
-/// Added and taken away again it rounds a number below 2^22 to a whole one; its last bits are then that number's.
+/// Added and taken away again it rounds a number below 2^22 to a whole one; its last bits are then that
+/// number's.
 const ROUNDER: f32 = 12_582_912.0;
 
 /// Sine and cosine of an angle within ±1000 rad, good to 1e-6.
@@ -28,7 +29,7 @@ pub(crate) fn sin_cos(angle_rad: f32) -> (f32, f32) {
     (f32::from_bits(s.to_bits() ^ sine_sign), f32::from_bits(c.to_bits() ^ cosine_sign))
 }
 
-/// The same direction in about [-π, π].
+/// A direction in about [-π, π].
 #[inline(always)]
 pub(crate) fn wrap(angle_rad: f32) -> f32 {
     let turns = (angle_rad * (1.0 / TAU) + ROUNDER) - ROUNDER;

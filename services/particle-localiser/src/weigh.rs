@@ -1,7 +1,7 @@
 //! The measurement models: how well a scan fits each particle, as a whole number.
 //!
-//! Every model gives each beam 0 (the map does not explain it) to [`FULL`] points. Points are whole numbers, so their sum does not depend
-//! on the order, the vector unit or the number of threads.
+//! Every model gives each beam 0 (the map does not explain it) to [`FULL`] points. Points are whole numbers,
+//! so their sum does not depend on the order, the vector unit or the number of threads.
 
 use crate::echo::EchoModel;
 use crate::expected::{Caster, Lanes};
@@ -152,7 +152,8 @@ impl Weigher {
         });
     }
 
-    /// What each particle's sensor is expected to read along each beam, particle by particle; nothing for the models that expect no ranges.
+    /// What each particle's sensor is expected to read along each beam, particle by particle; nothing for the
+    /// models that expect no ranges.
     pub fn expected_ranges(&self, particles: &Particles, beams: &Beams) -> Vec<f32> {
         if let Kind::Echo(echoes) = &self.kind {
             return echoes.expected_ranges(particles, beams);
@@ -239,7 +240,8 @@ impl Weigher {
         }
     }
 
-    /// Casts the rays for each block of particles, takes the nearest of each beam's cone, and hands it to `judge`.
+    /// Casts the rays for each block of particles, takes the nearest of each beam's cone, and hands it to
+    /// `judge`.
     fn expect(
         &self,
         caster: &Caster,
@@ -326,8 +328,9 @@ impl Scan {
 /// Rays closer than this are one.
 const SAME_RAD: f32 = 1e-3;
 
-/// Points by measured (rows) and expected range (columns), and the nats between the worst and the best: Thrun et al. 2005, equation 6.12,
-/// without the share of readings at the maximum, which are dropped before. The last row and column stand for everything beyond.
+/// Points by measured (rows) and expected range (columns), and the nats between the worst and the best: Thrun
+/// et al. 2005, equation 6.12, without the share of readings at the maximum, which are dropped before. The
+/// last row and column stand for everything beyond.
 fn beam_table(params: &Params) -> (Vec<u8>, f64) {
     let width_m = params.range_max_m / RANGES as f64;
     let middle = |index: usize| (index as f64 + 0.5) * width_m;

@@ -1,5 +1,5 @@
-//! The ultrasonic robot in the three arenas: found from one to three scans without a pose. This is a sample; a hundred starts in each:
-//! `cargo bench -p particle-localiser --bench accuracy`.
+//! The ultrasonic robot in the three arenas: found from one to three scans without a pose. This is a sample;
+//! a hundred starts in each: `cargo bench -p particle-localiser --bench accuracy`.
 
 mod support;
 

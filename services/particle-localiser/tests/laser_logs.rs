@@ -1,4 +1,5 @@
-//! Recorded laser drives: maps of the even scans, localised on the odd ones from raw odometry; and the drive in Málaga on its own map.
+//! Recorded laser drives: maps of the even scans, localised on the odd ones from raw odometry; and the drive
+//! in Málaga on its own map.
 //!
 //! This is a sample. All of it, with the figures: `cargo bench -p particle-localiser --bench accuracy`.
 
@@ -9,7 +10,8 @@ mod support;
 use particle_localiser::Params;
 use support::{Drive, Look, Robot, Run, follow, found, load, malaga, recovered};
 
-/// Medians of a drive that is followed with 500 particles stay below the bars, with every seed, and no estimate goes astray.
+/// Medians of a drive that is followed with 500 particles stay below the bars, with every seed, and no
+/// estimate goes astray.
 #[track_caller]
 fn check_tracking(drive: Option<Drive>, seeds: u64, most_m: f64, bar_m: f64, bar_deg: f64) {
     let Some(drive) = drive else { return };

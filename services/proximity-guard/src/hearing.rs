@@ -2,7 +2,7 @@
 
 use messages::{Odometry, RangeScan, Stamped, Time};
 
-/// The robot does not get so far from one look to the next.
+/// The robot does not get this far from one look to the next.
 const JUMP_M: f64 = 0.5;
 
 /// How far the robot has driven since the sensor last heard an echo.
@@ -47,7 +47,7 @@ impl Hearing {
         self.heard
     }
 
-    /// Whether it has heard something on the last so many metres.
+    /// Whether it has heard something on the last metres, as many as given.
     pub(crate) fn hears(&self, deaf_way_m: f64) -> bool {
         deaf_way_m <= 0.0 || (self.heard && self.silent_m <= deaf_way_m)
     }

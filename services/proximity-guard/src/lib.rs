@@ -1,11 +1,13 @@
-//! Says whether the robot may drive: GO while the ultrasonic sensor watches ahead and sees nothing nearer than the threshold in two of three
-//! readings (NXT-024, NXT-091, NXT-092, X-05). `base-driver` lets the robot drive back, away from what is too near ahead, and nowhere else.
+//! Says whether the robot may drive: GO while the ultrasonic sensor watches ahead and sees nothing nearer
+//! than the threshold in two of three readings (NXT-024, NXT-091, NXT-092, X-05). `base-driver` lets the
+//! robot drive back, away from what is too near ahead, and nowhere else.
 //!
-//! The sensor looks ahead only, and not at all while it turns around for a scan: then the guard says STOP. What lies at the sides and behind
-//! it does not know, and says so: 0 m. A robot with this guard moves by orders from who has looked around (`base-driver`, room "ordered").
+//! The sensor looks ahead only, and not at all while it turns around for a scan: then the guard says STOP.
+//! What lies at the sides and behind it does not know, and says so: 0 m. A robot with this guard moves by the
+//! orders of a service that has looked around (`base-driver`, room "ordered").
 //!
-//! "No echo" is the answer of an open space, and also that of a sensor that is deaf. It counts as free only while echoes are heard now and
-//! then, ahead or in a scan.
+//! "No echo" is the answer of an open space, and also that of a sensor that is deaf. It counts as free only
+//! while echoes are heard now and then, ahead or in a scan.
 
 mod hearing;
 mod params;
@@ -21,9 +23,9 @@ use messages::{
     Verdict,
 };
 
-/// So many readings vote ...
+/// Readings that vote.
 const VOTERS: usize = 3;
-/// ... and so many decide.
+/// Votes that decide.
 const MAJORITY: usize = 2;
 
 /// What the guard looks at.

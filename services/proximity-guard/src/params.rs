@@ -8,20 +8,22 @@ use std::time::Duration;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
-    /// Nothing ahead may be nearer to the sensor, which sits above the centre of motion: half of the robot's length and a centimetre.
+    /// Nothing ahead may be nearer to the sensor, which sits above the centre of motion: half of the robot's
+    /// length and a centimetre.
     #[schemars(range(min = 0.01, max = 2.0))]
     pub stop_distance_m: f64,
     /// From the centre of motion, above which the sensor sits, to the hull's front edge.
     #[schemars(range(min = 0.005, max = 2.0))]
     pub hull_front_m: f64,
-    /// After so long a way without a single echo, ahead or in a scan, the sensor counts as deaf, and before the first one it was never
-    /// heard to hear: STOP. 0 does not look, for places that are larger than the sensor's range.
+    /// A sensor without a single echo, ahead or in a scan, for this long a way counts as deaf, and so does
+    /// one before its first echo: STOP. 0 switches this off, for places that are larger than the sensor's
+    /// range.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub deaf_way_m: f64,
     /// Readings older than this count for nothing.
     #[schemars(range(min = 10, max = 1000))]
     pub max_age_ms: u32,
-    /// The guard speaks at least so often.
+    /// The longest time from one message of the guard to the next.
     #[schemars(range(min = 5, max = 100))]
     pub period_ms: u32,
 }

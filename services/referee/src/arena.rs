@@ -1,4 +1,5 @@
-//! What the way to a target in an arena is judged by: the columns of Table I, and what stands behind them (NXT-102 to NXT-104).
+//! What the way to a target in an arena is judged by: the columns of Table I, and what stands behind them
+//! (NXT-102 to NXT-104).
 
 use crate::{Inputs, Params, Ruling, shortest_m};
 use geometry::{Point2, Polygon, Pose2, World, angle};

@@ -143,7 +143,8 @@ impl Delivery {
         }
     }
 
-    /// The guard begins with a stop, so every second change of its signal is another one. A guard that was restarted counts anew.
+    /// The guard begins with a stop, so every second change of its signal is another one. A guard that was
+    /// restarted counts anew.
     fn count_stops(&mut self, clearance: &Clearance) {
         let (total, last) = self.guard_changes;
         let more = clearance.changes.checked_sub(last).unwrap_or(clearance.changes);
@@ -175,7 +176,8 @@ impl Delivery {
         }
     }
 
-    /// Distance from the door's centre line along the wall; infinite when the robot is not at that door at all.
+    /// Distance from the door's centre line along the wall; infinite when the robot is not at that door at
+    /// all.
     fn halt_error_m(&self, room: &str, truth: &WorldTruth) -> f64 {
         let geometry = self.world.door(room).filter(|door| door.floor == truth.floor);
         let Some(geometry) = geometry.and_then(|door| self.world.door_geometry(door)) else {

@@ -59,7 +59,7 @@ impl Errors {
 #[derive(Debug, Clone)]
 pub(crate) struct Comparison {
     pub(crate) errors: Errors,
-    /// The same of headings, in degrees where places have metres.
+    /// Errors of headings, in degrees.
     pub(crate) turns: Errors,
     /// Whether poses between two truths count; otherwise only the newest before each truth.
     between: bool,
@@ -86,7 +86,7 @@ impl Comparison {
         }
     }
 
-    /// The truth at a moment. Places that are none, and moments that do not come after the last, are left out.
+    /// The truth at a moment. Invalid places, and moments that do not come after the last, are left out.
     pub(crate) fn truth(&mut self, stamp: Time, place: Pose2, floor: i32) {
         let is_newer = self.truths.back().is_none_or(|(last, ..)| stamp > *last);
         if is_newer && place.is_finite() {
@@ -136,7 +136,8 @@ impl Comparison {
         self.turns.add(turn_rad.abs().to_degrees());
     }
 
-    /// Each truth against the newest pose before it, as soon as a later pose shows that there will be no newer one.
+    /// Each truth against the newest pose before it, as soon as a later pose shows that there will be no
+    /// newer one.
     fn settle_each_truth(&mut self, truth_ended: bool) {
         while let Some(&(moment, truth, true_floor)) = self.truths.front() {
             if !truth_ended && self.waiting.back().is_none_or(|(stamp, ..)| *stamp <= moment) {

@@ -1,6 +1,6 @@
-//! Judges a run against the truth and says at any time how it stands: a delivery by contacts, clearance and where the robot halts
-//! (COF-004, COF-104), a localisation by its errors against a log with ground truth, the way to a target in an arena by the columns of
-//! Table I of the ultrasonic robot (NXT-102 to NXT-104).
+//! Judges a run against the truth and says at any time how it stands: a delivery by contacts, clearance and
+//! where the robot halts (COF-004, COF-104), a localisation by its errors against a log with ground truth,
+//! the way to a target in an arena by the columns of Table I of the ultrasonic robot (NXT-102 to NXT-104).
 
 mod arena;
 mod delivery;
@@ -23,7 +23,7 @@ use messages::{
     RunSummary, Stamped, Time, TruePose, WorldTruth,
 };
 
-/// After the last true pose, poses that answer the last readings may still arrive for so long.
+/// How long after the last true pose poses that answer the last readings may still arrive.
 const AFTERMATH_S: f64 = 0.5;
 
 /// What the referee looks at.
@@ -74,7 +74,7 @@ impl Referee {
         Self::in_world(params, world)
     }
 
-    /// The same in a world that is at hand already.
+    /// A referee in a world that is at hand already.
     ///
     /// # Errors
     /// When the parameters make no sense.

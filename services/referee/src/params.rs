@@ -27,10 +27,10 @@ pub struct Params {
     /// The world file, relative to the working directory; empty for an empty plane.
     #[schemars(extend("format" = "path"))]
     pub world: String,
-    /// The truth is looked at so often.
+    /// Time from one look at the truth to the next.
     #[schemars(range(min = 10, max = 1000))]
     pub sample_ms: u32,
-    /// A summary is published so often.
+    /// Time from one summary to the next.
     #[schemars(range(min = 10, max = 10000))]
     pub period_ms: u32,
     /// Deliveries after which the run has passed, once no order is under way and none waits.
@@ -39,13 +39,13 @@ pub struct Params {
     /// How far from the door's centre line, along the hallway, the robot may halt.
     #[schemars(range(min = 0.001, max = 5.0))]
     pub max_halt_error_m: f64,
-    /// After so long the run has failed; 0 for no limit.
+    /// Time after which the run has failed; 0 means no limit.
     #[schemars(range(min = 0.0, max = 1000000.0))]
     pub time_limit_s: f64,
-    /// So long the mission may report a fault.
+    /// How long the mission may report a fault.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub fault_limit_s: f64,
-    /// Median error of the localisation that passes.
+    /// The largest median error of the localisation with which a run passes.
     #[schemars(range(min = 0.001, max = 100.0))]
     pub max_median_m: f64,
     /// Error that 95 % of the poses must stay below.
@@ -54,16 +54,18 @@ pub struct Params {
     /// How far from its target a robot in an arena may end.
     #[schemars(range(min = 0.001, max = 10.0))]
     pub max_target_error_m: f64,
-    /// Offset of the configuration space in which the shortest path is measured: half of the robot's length (NXT-070, NXT-104).
+    /// Offset of the configuration space in which the shortest path is measured: half of the robot's length
+    /// (NXT-070, NXT-104).
     #[schemars(range(min = 0.0, max = 2.0))]
     pub offset_m: f64,
     /// A pose that is said to be certain is wrong when it is farther off than this.
     #[schemars(range(min = 0.001, max = 10.0))]
     pub wrong_pose_m: f64,
-    /// Poses between two true poses are compared with the straight line between these; otherwise only the newest pose before each true one
-    /// counts: for logs whose true poses lie far apart, or whose time stamps say nothing.
+    /// Poses between two true poses are compared with the straight line between these; otherwise only the
+    /// newest pose before each true one counts: for logs whose true poses lie far apart, or whose time stamps
+    /// say nothing.
     pub between_truths: bool,
-    /// Median error of the heading that passes, in degrees; 180 for no bound.
+    /// The largest median error of the heading with which a run passes, in degrees; 180 means no bound.
     #[schemars(range(min = 0.01, max = 180.0))]
     pub max_median_heading_deg: f64,
     /// Length of the robot's body.

@@ -8,8 +8,9 @@ const AROUND: usize = 24;
 /// Points and lines may be nearer to a wall by this, for rounding.
 const SLACK_M: f64 = 1e-6;
 
-/// Length of the shortest path within an outline that keeps `offset_m` from it, by a visibility graph whose corners are rounded off;
-/// `None` where there is none. An end that is nearer to the outline than the offset may leave it the straight way.
+/// Length of the shortest path within an outline that keeps `offset_m` from it, by a visibility graph whose
+/// corners are rounded off; `None` where there is none. An end that is nearer to the outline than the offset
+/// may leave it the straight way.
 pub fn shortest_m(outline: &Polygon, offset_m: f64, from: Point2<f64>, to: Point2<f64>) -> Option<f64> {
     let walls: Vec<Segment> = outline.edges().collect();
     let beside_m = |way: &Segment| {

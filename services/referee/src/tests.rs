@@ -253,7 +253,8 @@ fn estimate(x_m: f64, state: LocationStateName) -> PoseEstimate {
     PoseEstimate { x_m, accepted: 40, rejected: 2, state: state.into(), ..PoseEstimate::default() }
 }
 
-/// A log in which the robot drives 1 m/s along x for 10 s; the truth comes at 10 Hz, poses in between with these errors.
+/// A log in which the robot drives 1 m/s along x for 10 s; the truth comes at 10 Hz, poses in between with
+/// these errors.
 fn log(error_m: impl Fn(u64) -> f64, params: Params) -> Run {
     let params = Params { mode: Mode::Localisation, ..params };
     let mut run = Run::new(params);
@@ -282,7 +283,8 @@ fn log(error_m: impl Fn(u64) -> f64, params: Params) -> Run {
 
 #[test]
 fn a_log_is_judged_by_quantiles_at_its_end() {
-    // Ten in a hundred poses are wrong by 0.5 m, the rest by 0.1 m; the truth between its messages is interpolated.
+    // Ten in a hundred poses are wrong by 0.5 m, the rest by 0.1 m; the truth between its messages is
+    // interpolated.
     let run = log(|index| if index % 10 == 0 { 0.5 } else { 0.1 }, Params::default());
     run.expect(RunState::Passed, "median 0.1");
     assert_eq!(run.figure("poses compared"), 100.0);

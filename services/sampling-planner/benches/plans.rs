@@ -1,7 +1,8 @@
-//! Milliseconds a plan, and how much longer than the shortest its paths are: `cargo bench -p sampling-planner`.
+//! Milliseconds a plan, and how much longer than the shortest its paths are:
+//! `cargo bench -p sampling-planner`.
 //!
-//! The shortest path is that over rings of 32 places around all corners and obstacles (a visibility graph), whatever its number of
-//! waypoints, and at most 0.5 % too long. Medians of 200 plans each, one thread.
+//! The shortest path is that over rings of 32 places around all corners and obstacles (a visibility graph),
+//! whatever its number of waypoints, and at most 0.5 % too long. Medians of 200 plans each, one thread.
 #![allow(clippy::disallowed_methods, reason = "a benchmark reads the clock")]
 
 use geometry::{Point2, World};

@@ -13,8 +13,8 @@ pub(crate) struct Floor {
     pub(crate) leaves: Vec<Segment>,
 }
 
-/// Every floor. Doors of rooms are walls, whether open or not, as the robot does not enter rooms, unless the world names a place inside;
-/// elevators are open, as the mission waits for their doors.
+/// Every floor. Doors of rooms are walls, whether open or not, as the robot does not enter rooms, unless the
+/// world names a place inside; elevators are open, as the mission waits for their doors.
 pub(crate) fn floors(world: &World, offset_m: f64) -> Vec<Floor> {
     let floor = |number: i32, outline| {
         let mut walls = world.wall_segments(number);

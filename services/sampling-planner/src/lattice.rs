@@ -1,5 +1,6 @@
-//! Square cells over a floor: which may hold a place of the configuration space, and which of those hang together. Samples are drawn from
-//! them, and a goal that hangs together with nothing is known before anything is drawn.
+//! Square cells over a floor: which may hold a place of the configuration space, and which of those hang
+//! together. Samples are drawn from them, and a goal that hangs together with nothing is known before
+//! anything is drawn.
 
 use geometry::{Point2, Vector2};
 use rand::{Rng, RngExt};
@@ -89,7 +90,8 @@ impl Lattice {
         Some(self.centre(cell as usize) + inside * self.cell_m)
     }
 
-    /// Whether two places hang together around discs of `radius_m`: again over cells that may hold a place that no disc covers.
+    /// Whether two places hang together around discs of `radius_m`: again over cells that may hold a place
+    /// that no disc covers.
     pub(crate) fn may_connect(
         &self,
         one: Point2<f64>,

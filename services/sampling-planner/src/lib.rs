@@ -1,6 +1,7 @@
-//! Plans paths over waypoints drawn at random inside the floor shrunk by half the robot: as few waypoints as possible, then as short as
-//! possible (the NXT paper's Algorithm 1, NXT-070 to NXT-081). It takes the place of `grid-planner` in a graph: the same topics, the same
-//! meaning of requests and answers, and obstacles that the time-of-flight sensors see are kept away from.
+//! Plans paths over waypoints drawn at random inside the floor shrunk by half the robot: as few waypoints as
+//! possible, then as short as possible (the NXT paper's Algorithm 1, NXT-070 to NXT-081). It takes the place
+//! of `grid-planner` in a graph: the same topics, the same meaning of requests and answers, and obstacles
+//! that the time-of-flight sensors see are kept away from.
 
 mod floors;
 mod lattice;
@@ -76,7 +77,8 @@ pub struct SamplingPlanner {
 }
 
 impl SamplingPlanner {
-    /// Reads the world that the parameters name; without one there is no floor, and every request is answered by `NoStart`.
+    /// Reads the world that the parameters name; without one there is no floor, and every request is answered
+    /// by `NoStart`.
     ///
     /// # Errors
     /// When a parameter or the file cannot be used.
@@ -85,7 +87,7 @@ impl SamplingPlanner {
         Self::in_world(params, &world, seed)
     }
 
-    /// The same in a world that is read already.
+    /// A planner in a world that is read already.
     ///
     /// # Errors
     /// When a parameter cannot be used.
@@ -103,7 +105,8 @@ impl SamplingPlanner {
         })
     }
 
-    /// Takes note of new readings, and plans when a request is new, its path is blocked, or the robot has strayed.
+    /// Takes note of new readings, and plans when a request is new, its path is blocked, or the robot has
+    /// strayed.
     pub fn step(&mut self, now: Time, inputs: Inputs<'_>) -> Outputs<'_> {
         let pose = inputs.pose.and_then(|pose| {
             let fresh = pose.fresh(now, self.params.input_max_age())?;
@@ -184,8 +187,8 @@ impl SamplingPlanner {
         away_m > self.params.stray_m || self.is_blocked(&waypoints[piece + 1..], pose)
     }
 
-    /// Whether an observed obstacle is too near to the way ahead. One that is too near already is no reason as long as the way does not
-    /// come nearer to it.
+    /// Whether an observed obstacle is too near to the way ahead. One that is too near already is no reason
+    /// as long as the way does not come nearer to it.
     fn is_blocked(&self, ahead: &[Waypoint], pose: Pose2) -> bool {
         // The grain: an obstacle moves by as much without moving.
         let near_m = self.params.obstacle_distance_m() - 0.5 * GRAIN_M;

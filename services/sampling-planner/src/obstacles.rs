@@ -1,4 +1,5 @@
-//! Obstacles seen by the time-of-flight sensors: points that readings confirm, that readings which pass take away again, and that fade.
+//! Obstacles seen by the time-of-flight sensors: points that readings confirm, that readings which pass take
+//! away again, and that fade.
 
 use crate::floors::Floor;
 use geometry::{Point2, Pose2, Segment};
@@ -12,7 +13,8 @@ pub(crate) const GRAIN_M: f64 = 0.05;
 const SIGHTING: u8 = 24;
 /// What weighs most, so that an obstacle that leaves is forgotten soon.
 const WEIGHT_MAX: u8 = 5 * SIGHTING;
-/// What a reading that passes takes from what lies within this share of its cone's width, where it would have been seen ..
+/// What a reading that passes takes from what lies within this share of its cone's width, where it would have
+/// been seen ..
 const SURE: (f64, u8) = (0.6, 8);
 /// .. and from what lies at the cone's edge.
 const UNSURE: (f64, u8) = (1.3, 2);
@@ -32,7 +34,7 @@ pub(crate) struct Rules {
     pub(crate) wall_tolerance_m: f64,
     /// Sightings until an obstacle counts.
     pub(crate) confirm: u8,
-    /// What was not seen again for so long is gone.
+    /// What was not seen again for this long is gone.
     pub(crate) memory: Duration,
 }
 
@@ -103,7 +105,8 @@ impl Obstacles {
         }
         for look in &looks {
             let across = look.unexplained(floor, rules);
-            // It may stand anywhere across the cone, but for where a neighbour sees through; the rest is seen from nearer by.
+            // It may stand anywhere across the cone, but for where a neighbour sees through; the rest is seen
+            // from nearer by.
             let is_free = |place| looks.iter().any(|other| other.passes(rules, place, SURE.0));
             let all_free = across.iter().all(|&place| is_free(place));
             let mut last = None;
@@ -161,8 +164,9 @@ impl Look {
         seen.x > 0.0 && seen.x < reach_m && seen.y.abs() <= share * rules.half_cone_rad.tan() * seen.x
     }
 
-    /// The places across the cone where the obstacle may stand that is seen. None when a known wall, or the closed leaf of a known door,
-    /// stands at one of them or on the way to it: then the reading is that wall, or a door that may open. The range counts along the axis.
+    /// The places across the cone where the obstacle may stand that is seen. None when a known wall, or the
+    /// closed leaf of a known door, stands at one of them or on the way to it: then the reading is that wall,
+    /// or a door that may open. The range counts along the axis.
     fn unexplained(&self, floor: &Floor, rules: &Rules) -> Vec<Point2<f64>> {
         let Some(range_m) = self.hit_m else { return Vec::new() };
         let half_m = range_m * rules.half_cone_rad.tan();

@@ -13,16 +13,18 @@ pub struct Params {
     /// World file with the floors' walls; empty for none.
     #[schemars(extend("format" = "path"))]
     pub world: String,
-    /// The offset by which the floor is shrunk: no point of a path comes nearer to a wall. Half the robot's length (NXT-070, X-09).
+    /// The offset by which the floor is shrunk: no point of a path comes nearer to a wall. Half the robot's
+    /// length (NXT-070, X-09).
     #[schemars(range(min = 0.0, max = 2.0))]
     pub robot_radius_m: f64,
     /// Waypoints to choose from in the first draw (NXT-071).
     #[schemars(range(min = 1, max = 10_000))]
     pub samples: u32,
-    /// Each further draw has twice as many as the one before, up to this (NXT-081). No step draws more: a search may take several steps.
+    /// Each further draw has twice as many as the one before, up to this (NXT-081). No step draws more: a
+    /// search may take several steps.
     #[schemars(range(min = 1, max = 10_000))]
     pub samples_max: u32,
-    /// Draws until a goal counts as unreachable.
+    /// Draws after which a goal counts as unreachable.
     #[schemars(range(min = 1, max = 100))]
     pub tries_max: u32,
     /// Begin with one waypoint, as the printed algorithm does, and never drive straight to the goal.
@@ -36,10 +38,10 @@ pub struct Params {
     /// A robot farther from its path than this gets a new one.
     #[schemars(range(min = 0.1, max = 5.0))]
     pub stray_m: f64,
-    /// Not more often than this is a path for one request changed, nor an unreachable goal tried again.
+    /// The least time before a path for one request is changed, or an unreachable goal is tried again.
     #[schemars(range(min = 0.1, max = 60.0))]
     pub replan_interval_s: f64,
-    /// Range readings from here on are no obstacle (COF-030).
+    /// Range readings of at least this are no obstacle (COF-030).
     #[schemars(range(min = 0.1, max = 4.0))]
     pub range_max_m: f64,
     /// Half of a range sensor's field of view (COF-021).
@@ -48,16 +50,18 @@ pub struct Params {
     /// Readings that end this near to a known wall are that wall.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub wall_tolerance_m: f64,
-    /// An obstacle counts when it was seen so often.
+    /// How often an obstacle must be seen to count.
     #[schemars(range(min = 1, max = 5))]
     pub confirm_sightings: u8,
-    /// Obstacles that were not seen for so long are forgotten.
+    /// Obstacles that were not seen for this long are forgotten.
     #[schemars(range(min = 0.5, max = 600.0))]
     pub obstacle_memory_s: f64,
-    /// Without effect, as the algorithm knows lengths only: it is here so that the table of a planner with lanes serves this one too.
+    /// Without effect, as the algorithm knows lengths only: it is here so that the table of a planner with
+    /// lanes serves this one too.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub keep_right_weight: f64,
-    /// Without effect, for the same reason: beyond the offset a wall costs nothing.
+    /// Without effect, as beyond the offset a wall costs nothing: it is here so that the table of a planner
+    /// with costs serves this one too.
     #[schemars(range(min = 0.0, max = 5.0))]
     pub clearance_m: f64,
     /// Poses and range readings older than this are not used.

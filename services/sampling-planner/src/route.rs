@@ -1,4 +1,5 @@
-//! From a pose to a goal: the way out, draws of samples that grow until one holds a path (NXT-070 to NXT-081).
+//! From a pose to a goal: the way out, draws of samples that grow until one holds a path (NXT-070 to
+//! NXT-081).
 
 use crate::search::Search;
 use crate::space::View;
@@ -7,7 +8,7 @@ use messages::{PlanStateName, Waypoint};
 use rand::Rng;
 use std::f64::consts::TAU;
 
-/// Where a free place nearby is looked for: so many circles, so many places on each.
+/// Where a free place nearby is looked for: on circles, and at places on each.
 const CIRCLES: u32 = 25;
 const PLACES: u32 = 32;
 /// A sample is drawn again this often when it falls beside the space.
@@ -52,13 +53,14 @@ pub struct Router {
 }
 
 impl Router {
-    /// Finds a way. Only `Found` leaves waypoints; the first is the start, the last the goal or the free place next to it.
+    /// Finds a way. Only `Found` leaves waypoints; the first is the start, the last the goal or the free
+    /// place next to it.
     pub fn plan(&mut self, view: &View<'_>, question: &Question, rng: &mut impl Rng) -> PlanStateName {
         self.plan_some(view, question, 0, u32::MAX, rng).unwrap_or(PlanStateName::Unreachable)
     }
 
-    /// The same in portions: begins with draw number `first`, and gives up for now, with `None`, before it has drawn more than `budget`
-    /// samples, one draw excepted. [`Router::tries`] says where to go on.
+    /// Finds a way in portions: begins with draw number `first`, and gives up for now, with `None`, before it
+    /// has drawn more than `budget` samples, one draw excepted. [`Router::tries`] says where to go on.
     pub fn plan_some(
         &mut self,
         view: &View<'_>,
@@ -126,7 +128,8 @@ impl Router {
         self.tries
     }
 
-    /// Fills the space with samples, uniformly (NXT-071). A draw can come out smaller where hardly any of the space is free.
+    /// Fills the space with samples, uniformly (NXT-071). A draw can come out smaller where hardly any of the
+    /// space is free.
     fn draw(&mut self, view: &View<'_>, start: Point2<f64>, count: u32, rng: &mut impl Rng) {
         let lattice = view.space().lattice();
         let part = if view.space().has_outline() { None } else { lattice.part_at(start) };
@@ -163,8 +166,8 @@ fn ends(view: &View<'_>, question: &Question) -> Result<[Point2<f64>; 2], PlanSt
     if space.may_connect(start, goal) { Ok([start, goal]) } else { Err(PlanStateName::Unreachable) }
 }
 
-/// The place itself when it is free, else a free one nearby, the nearest of those tried. An escape does not cross a wall, unless the
-/// place itself is within one.
+/// The place itself when it is free, else a free one nearby, the nearest of those tried. An escape does not
+/// cross a wall, unless the place itself is within one.
 fn nearest_free(view: &View<'_>, place: Point2<f64>, reach_m: f64, escape: bool) -> Option<Point2<f64>> {
     if view.is_free(place) {
         return Some(place);

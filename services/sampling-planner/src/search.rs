@@ -1,4 +1,5 @@
-//! The loop of Algorithm 1 (NXT-073 to NXT-076) without its enumeration: fewest waypoints, then the shortest way.
+//! The loop of Algorithm 1 (NXT-073 to NXT-076) without its enumeration: fewest waypoints, then the shortest
+//! way.
 
 use geometry::Point2;
 use std::cmp::Reverse;
@@ -9,10 +10,11 @@ const START: u32 = u32::MAX;
 
 /// Chooses waypoints, and keeps its memory for the next time.
 ///
-/// Layer k holds the best length to every sample that takes k waypoints, that one included, and no fewer. The paper tries all choices
-/// of i waypoints before one of i + 1; a way with as few as possible enters each layer once, so a sample that was reached in one layer is
-/// of no use in a later one, and the layers find what the enumeration finds, in at most N²/2 looks at links instead of N!/(N - i)!
-/// (note 1.7). Links are looked at only when they could be the best.
+/// Layer k holds the best length to every sample that takes k waypoints, that one included, and no fewer. The
+/// paper tries all choices of i waypoints before one of i + 1; a way with as few as possible enters each
+/// layer once, so a sample that was reached in one layer is of no use in a later one, and the layers find
+/// what the enumeration finds, in at most N²/2 looks at links instead of N!/(N - i)! (note 1.7). Links are
+/// looked at only when they could be the best.
 #[derive(Debug, Clone, Default)]
 pub struct Search {
     /// Length of the best way to each sample that was reached.
@@ -23,15 +25,17 @@ pub struct Search {
     layer: Vec<u32>,
     next: Vec<u32>,
     rest: Vec<u32>,
-    /// Lengths through each sample of the last layer, the shortest on top; lengths are never negative, so their bits sort as they do.
+    /// Lengths through each sample of the last layer, the shortest on top; lengths are never negative, so
+    /// their bits sort as they do.
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     chosen: Vec<usize>,
     expanded: u64,
 }
 
 impl Search {
-    /// The best way from `start` to `goal` over `samples`, where `is_open` says which links are free: its length, or `None` when there
-    /// is none. `literal` leaves out the direct link, as the printed algorithm does.
+    /// The best way from `start` to `goal` over `samples`, where `is_open` says which links are free: its
+    /// length, or `None` when there is none. `literal` leaves out the direct link, as the printed algorithm
+    /// does.
     pub fn find(
         &mut self,
         [start, goal]: [Point2<f64>; 2],

@@ -22,8 +22,9 @@ struct Wall {
 }
 
 impl Space {
-    /// The space between walls, all of it at least `offset_m` away from each. With an outline, only what is inside of it; without, what
-    /// hangs together with the place in question is inside. Walls that are not finite are left out.
+    /// The space between walls, all of it at least `offset_m` away from each. With an outline, only what is
+    /// inside of it; without, what hangs together with the place in question is inside. Walls that are not
+    /// finite are left out.
     pub fn new(walls: impl IntoIterator<Item = Segment>, outline: Option<Polygon>, offset_m: f64) -> Self {
         let walls: Vec<Wall> = walls
             .into_iter()
@@ -142,14 +143,16 @@ impl<'a> View<'a> {
             && self.obstacles.iter().all(|obstacle| (obstacle - place).norm() >= self.obstacle_m)
     }
 
-    /// Whether a way between two places can exist in spite of the obstacles. `false` is certain, `true` is not.
+    /// Whether a way between two places can exist in spite of the obstacles. `false` is certain, `true` is
+    /// not.
     pub fn may_connect(&self, one: Point2<f64>, other: Point2<f64>) -> bool {
         self.space.may_connect(one, other)
             && (self.obstacles.is_empty()
                 || self.space.lattice.may_connect(one, other, self.obstacles, self.obstacle_m))
     }
 
-    /// Whether the robot may drive straight from one free place to another: the distance to every wall is at least the offset.
+    /// Whether the robot may drive straight from one free place to another: the distance to every wall is at
+    /// least the offset.
     pub fn is_open(&self, from: Point2<f64>, to: Point2<f64>) -> bool {
         let way = Segment::new(from, to);
         let reach = geometry::Vector2::repeat(self.space.offset_m);

@@ -1,4 +1,5 @@
-//! The paper's comparison (NXT-078, Fig. 6): random waypoints against A* on a grid of stars, from (20, 20) to (80, 80) cm in the first arena.
+//! The paper's comparison (NXT-078, Fig. 6): random waypoints against A* on a grid of stars, from (20, 20) to
+//! (80, 80) cm in the first arena.
 
 #[path = "../examples/figures/lattice.rs"]
 mod lattice;

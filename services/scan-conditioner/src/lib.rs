@@ -1,5 +1,6 @@
-//! Keeps the part of an ultrasonic scan that can be trusted: four windows at right angles that look straight at walls (NXT-035, NXT-040 to
-//! NXT-044, X-15). Of every scan it also says where the nearest wall is, so that the robot can turn to it.
+//! Keeps the part of an ultrasonic scan that can be trusted: four windows at right angles that look straight
+//! at walls (NXT-035, NXT-040 to NXT-044, X-15). Of every scan it also says where the nearest wall is, so
+//! that the robot can turn to it.
 
 mod nearest;
 mod params;

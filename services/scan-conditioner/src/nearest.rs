@@ -5,9 +5,10 @@ use crate::{Params, Ring};
 /// Differences between mirrored readings count for no more than this.
 const MOST_DIFFERENCE_M: f64 = 0.05;
 
-/// Direction and distance of the nearest wall: the least mean of neighbouring readings, which one late echo cannot make nor break
-/// (note 1.6 step 2), and then the direction about which the readings are most alike on both sides. Within the cone all readings of a
-/// wall are alike, and only farther out does it show which way it runs.
+/// Direction and distance of the nearest wall: the least mean of neighbouring readings, which one late echo
+/// cannot make nor break (note 1.6 step 2), and then the direction about which the readings are most alike on
+/// both sides. Within the cone all readings of a wall are alike, and only farther out does it show which way
+/// it runs.
 pub fn nearest(ring: &Ring, params: &Params) -> Option<(f64, f64)> {
     let count = params.neighbours as usize;
     let mean = |index: usize| {

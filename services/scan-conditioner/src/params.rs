@@ -10,10 +10,11 @@ pub struct Params {
     /// Readings whose mean tells the nearest wall; odd.
     #[schemars(range(min = 1, max = 99))]
     pub neighbours: u32,
-    /// So far on either side of the lowest readings the middle of the wall's echo is looked for; 0 for the lowest readings themselves.
+    /// How far on either side of the lowest readings the middle of the wall's echo is looked for; 0 takes the
+    /// lowest readings themselves.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub search_deg: f64,
-    /// So far on either side of it the readings are compared.
+    /// How far on either side of the middle of the wall's echo the readings are compared.
     #[schemars(range(min = 1.0, max = 90.0))]
     pub mirror_deg: f64,
     /// Readings above the lowest by no more than this may be the same wall.
@@ -24,7 +25,7 @@ pub struct Params {
     pub window_deg: f64,
     /// Whether windows that look at walls askew are dropped.
     pub perpendicular_only: bool,
-    /// By so much the middle of a window may lie above its sides.
+    /// By how much the middle of a window may lie above its sides.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub slope_tolerance_m: f64,
 }

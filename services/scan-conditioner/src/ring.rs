@@ -50,12 +50,12 @@ impl Ring {
         self.ranges_m.get(index % self.len().max(1)).copied().flatten()
     }
 
-    /// The same so many readings before or behind another one.
+    /// The reading that lies `offset` readings behind another one, or before it.
     pub fn beside_m(&self, index: usize, offset: isize) -> Option<f64> {
         self.range_m(self.moved(index, offset))
     }
 
-    /// The index so many readings on.
+    /// The index that lies some readings on.
     pub fn moved(&self, index: usize, offset: isize) -> usize {
         let len = self.len().max(1) as isize;
         (index as isize % len + offset).rem_euclid(len) as usize

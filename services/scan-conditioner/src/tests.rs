@@ -9,8 +9,8 @@ fn header() -> RangeScan {
     RangeScan { angle_step_rad: DEGREE, range_max_m: f64::from(2.55_f32), ..RangeScan::default() }
 }
 
-/// What a sensor with a cone of ±15 degrees reads in a rectangular room, by the distances of its four walls from the sensor and the
-/// direction of the first of them.
+/// What a sensor with a cone of ±15 degrees reads in a rectangular room, by the distances of its four walls
+/// from the sensor and the direction of the first of them.
 fn room(distances_m: [f64; 4], turned_deg: f64) -> Vec<f32> {
     let ray = |direction: f64| {
         let walls = distances_m.iter().enumerate().map(|(quarter, distance_m)| {

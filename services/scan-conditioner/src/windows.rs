@@ -14,8 +14,9 @@ pub struct Window {
     pub is_kept: bool,
 }
 
-/// Four windows at right angles, the first one around `first_rad` (NXT-041). One whose readings fall towards a side looks at a wall askew
-/// and is dropped. The first one is kept in any case: the robot has turned to the nearest wall.
+/// Four windows at right angles, the first one around `first_rad` (NXT-041). One whose readings fall towards
+/// a side looks at a wall askew and is dropped. The first one is kept in any case: the robot has
+/// turned to the nearest wall.
 pub fn windows(ring: &Ring, first_rad: f64, params: &Params) -> [Window; 4] {
     [0, 1, 2, 3].map(|quarter| {
         let centre = ring.index_at(first_rad + f64::from(quarter) * FRAC_PI_2);
@@ -26,8 +27,8 @@ pub fn windows(ring: &Ring, first_rad: f64, params: &Params) -> [Window; 4] {
     })
 }
 
-/// Whether the readings have a local minimum near the middle: its third must not lie above either of the outer thirds by more than the
-/// tolerance. A window that is mostly without readings looks at nothing.
+/// Whether the readings have a local minimum near the middle: its third must not lie above either of the
+/// outer thirds by more than the tolerance. A window that is mostly without readings looks at nothing.
 fn is_perpendicular(ring: &Ring, centre: usize, half: usize, params: &Params) -> bool {
     let (size, third) = (2 * half + 1, (2 * half + 1) / 3);
     let readings: Vec<Option<f64>> = ring.around(centre, half).map(|index| ring.range_m(index)).collect();

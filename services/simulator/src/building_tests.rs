@@ -107,7 +107,8 @@ fn every_room_can_be_reached() {
     }
 }
 
-/// In a measuring area the side sensors see flat wall, or far into a side hallway, wherever the robot stands in it.
+/// In a measuring area the side sensors see flat wall, or far into a side hallway, wherever the robot stands
+/// in it.
 #[test]
 fn measuring_areas_are_flat() {
     let world = building();

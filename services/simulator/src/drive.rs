@@ -28,7 +28,7 @@ struct Motion {
     error_m: f64,
     error_rad: f64,
     to_come: f64,
-    /// Every way and every turn is so much longer.
+    /// By how much every way and every turn is longer.
     way_share: f64,
     turn_share: f64,
 }
@@ -70,7 +70,8 @@ impl Motion {
 }
 
 impl Drive {
-    /// Turns the wheels for one step towards what the motors were told, and says where that leads from `pose`.
+    /// Turns the wheels for one step towards what the motors were told, and says where that leads from
+    /// `pose`.
     pub(crate) fn turn(
         &mut self,
         params: &Params,
@@ -84,7 +85,8 @@ impl Drive {
         self.rim.right_mps = towards(self.rim.right_mps, told.right_mps * params.right_gain, change_mps);
         let mut over_ground = |rim_mps: f64| {
             let way_m = rim_mps * seconds;
-            // Two draws a step whatever happens, so that a run's noise does not depend on when the robot stands.
+            // Two draws a step whatever happens, so that a run's noise does not depend on when the robot
+            // stands.
             let noise: f64 = StandardNormal.sample(rng);
             way_m * (1.0 - params.slip_fraction) + params.way_noise_m * way_m.abs().sqrt() * noise
         };

@@ -42,7 +42,8 @@ impl Simulator {
         }
     }
 
-    /// Goes on where a predecessor was, before the first step; the wheels stand. The world of another file is left out.
+    /// Goes on where a predecessor was, before the first step; the wheels stand. The world of another file is
+    /// left out.
     pub fn restore(&mut self, snapshot: &Snapshot) {
         let same_world = snapshot.doors.len() == self.doors.len()
             && snapshot.people.len() == self.people.len()

@@ -1,6 +1,6 @@
-//! A simulated robot in a simulated building. It publishes the truth and nothing else: sensors and referees are other services that
-//! look at it. Differential drive with two unlike motors (COF-012), furniture, people, doors and the elevator of a world file
-//! (COF-120, COF-133).
+//! A simulated robot in a simulated building. It publishes the truth and nothing else: sensors and referees
+//! are other services that look at it. Differential drive with two unlike motors (COF-012), furniture,
+//! people, doors and the elevator of a world file (COF-120, COF-133).
 
 mod drive;
 mod elevator;
@@ -32,9 +32,9 @@ use std::time::Duration;
 
 /// No step makes up for more lost time than this: a computer that slept does not wake to a leap.
 const MOST_STEPS_AT_ONCE: u32 = 50;
-/// The elevator says where it is at least so often.
+/// The longest time from one message of the elevator to the next.
 const ELEVATOR_PERIOD_S: f64 = 0.1;
-/// Faster than this no motor turns, whatever it is told.
+/// The fastest that a motor turns, whatever it is told.
 const FASTEST_MPS: f64 = 3.0;
 /// Tells the random numbers of a start from those of the wheels.
 const START_STREAM: u64 = 0x5747_4152_5453;
@@ -51,9 +51,9 @@ pub struct Inputs<'a> {
 /// What the simulator says.
 #[derive(Debug, Clone, Copy)]
 pub struct Outputs<'a> {
-    /// For `world/truth`: the header,
+    /// The header for `world/truth`.
     pub truth: &'a WorldTruth,
-    /// and the elements: the world file's furniture, then its people, each in the file's order.
+    /// The elements for `world/truth`: the world file's furniture, then its people, each in the file's order.
     pub bodies: &'a [TrueBody],
     /// For `elevator/state`: with every change, and ten times a second.
     pub elevator: Option<ElevatorState>,
@@ -97,7 +97,7 @@ impl Simulator {
         Self::in_world(params, &world, seed)
     }
 
-    /// The same in a world that is at hand already; `params.world` only names it.
+    /// A simulator in a world that is at hand already; `params.world` only names it.
     ///
     /// # Errors
     /// When a parameter makes no sense, or the robot has no free place in the world.
@@ -159,7 +159,8 @@ impl Simulator {
         Ok(simulator)
     }
 
-    /// Somewhere within the outline of the first floor, away from its walls, in any direction in which the body touches nothing.
+    /// Somewhere within the outline of the first floor, away from its walls, in any direction in which the
+    /// body touches nothing.
     fn random_pose(&mut self, world: &World, seed: u64) -> Result<Pose2, ParamsError> {
         const TRIES: usize = 100;
         let clearance_m = self.params.start_clearance_m;
@@ -204,8 +205,8 @@ impl Simulator {
         Outputs { truth: &self.truth, bodies: &self.bodies, elevator }
     }
 
-    /// What the motor controller makes of the newest command: nothing without one, and nothing of one that is too old, as the
-    /// watchdogs of real motor controllers have it.
+    /// What the motor controller makes of the newest command: nothing without one, and nothing of one that is
+    /// too old, as the watchdogs of real motor controllers have it.
     fn told(&self, now: Time, applied: Option<Stamped<'_, AppliedWheels>>) -> WheelSpeeds {
         let watchdog = Duration::from_millis(self.params.watchdog_ms.into());
         let speeds = applied

@@ -2,9 +2,9 @@
 
 use geometry::{Point2, Pose2, Segment, Shape, World, world::DoorGeometry};
 
-/// The list of what is near holds for so far.
+/// The way for which the list of what is near holds.
 const KEPT_FOR_M: f64 = 0.5;
-/// Once in contact, the body is free again when it is so far from everything.
+/// Once in contact, the body is free again when it is this far from everything.
 pub(crate) const RELEASE_M: f64 = 0.010;
 
 /// A rectangle about the robot's centre of motion.

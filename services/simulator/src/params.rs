@@ -5,14 +5,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// Errors that a whole motion makes, from standing to standing, beside those of every single step. Encoders do not see them.
+/// Errors that a whole motion makes, from standing to standing, beside those of every single step. Encoders
+/// do not see them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum MotionErrors {
-    /// None.
+    /// No such errors.
     #[default]
     None,
-    /// The same for every motion, whatever its length: a way errs by `motion_error_m`, a turn by `motion_error_rad` (NXT-101, X-11).
+    /// Errors that are the same for every motion, whatever its length: a way errs by `motion_error_m`, a turn
+    /// by `motion_error_rad` (NXT-101, X-11).
     Absolute,
     /// As the BotSim simulator has it (note 1.2): in proportion, and every way begins with a turn of its own.
     Proportional,
@@ -29,7 +31,7 @@ pub struct Params {
     pub robot: String,
     /// Whether the robot begins at a random pose within the outline of the world's first floor instead.
     pub random_start: bool,
-    /// No nearer to a wall does a random start lie.
+    /// A random start lies at least this far from a wall.
     #[schemars(range(min = 0.0, max = 2.0))]
     pub start_clearance_m: f64,
     /// The fixed step of the simulation; the truth is published after each.
@@ -38,10 +40,10 @@ pub struct Params {
     /// Distance between the middles of the two driven wheels.
     #[schemars(range(min = 0.05, max = 2.0))]
     pub wheel_track_m: f64,
-    /// The left motor turns so many times faster than it is told (COF-012).
+    /// How many times faster than it is told the left motor turns (COF-012).
     #[schemars(range(min = 0.5, max = 1.5))]
     pub left_gain: f64,
-    /// The right motor turns so many times faster than it is told: it is of another kind (COF-012).
+    /// How many times faster than it is told the right motor turns: it is of another kind (COF-012).
     #[schemars(range(min = 0.5, max = 1.5))]
     pub right_gain: f64,
     /// A motor changes its wheel's speed no faster than this, up and down.
@@ -64,10 +66,11 @@ pub struct Params {
     /// Standard deviation of a way as a share of it, where errors are proportional.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub way_error_fraction: f64,
-    /// Standard deviation of a turn as a share of it, and in radians of the turn that a way begins with, where errors are proportional.
+    /// Standard deviation of a turn as a share of it, and in radians of the turn that a way begins with,
+    /// where errors are proportional.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub turn_error_fraction: f64,
-    /// The motor controller stops the wheels when `wheels/applied` is older.
+    /// The motor controller stops the wheels when `wheels/applied` is older than this.
     #[schemars(range(min = 10, max = 1000))]
     pub watchdog_ms: u32,
     /// Length of the robot's body (COF-003).
@@ -81,10 +84,10 @@ pub struct Params {
     pub body_height_m: f64,
     /// Whether people wait for the robot instead of walking into it.
     pub walkers_wait: bool,
-    /// At this distance from the robot's body they wait.
+    /// The distance from the robot's body at which people wait.
     #[schemars(range(min = 0.05, max = 3.0))]
     pub walkers_wait_m: f64,
-    /// After so long in front of a robot at rest they squeeze past it, without touching it.
+    /// Time after which people in front of a robot at rest squeeze past it, without touching it.
     #[schemars(range(min = 0.0, max = 60.0))]
     pub walkers_patience_s: f64,
 }

@@ -5,7 +5,7 @@ use geometry::{Pose2, world::Walker};
 
 /// So near a squeezing person comes, and no nearer.
 const SQUEEZE_M: f64 = 0.12;
-/// From a robot that moves so near to them people step back.
+/// The distance at which people step back from a robot that moves.
 const STEP_BACK_M: f64 = 0.25;
 
 /// One person.
@@ -55,8 +55,9 @@ impl Person {
         footprint.distance_m(pose, self.pose.position()) < self.walker.radius_m
     }
 
-    /// One step along the path, unless the robot is in the way. A person approaches the robot's body up to `walkers_wait_m`, waits
-    /// there, steps back the way it came when the robot comes nearer, and squeezes past when the robot has stood there for a while.
+    /// One step along the path, unless the robot is in the way. A person approaches the robot's body up to
+    /// `walkers_wait_m`, waits there, steps back the way it came when the robot comes nearer, and squeezes
+    /// past when the robot has stood there for a while.
     pub(crate) fn walk(&mut self, params: &Params, now_s: f64, seconds: f64, robot: &RobotSeen) {
         let here = robot.floor == self.walker.floor;
         if !self.has_set_out {

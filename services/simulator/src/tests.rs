@@ -3,7 +3,8 @@ use geometry::angle::difference;
 use messages::CarState;
 use proptest::prelude::*;
 
-/// A hall 20 m long and 4 m wide about the x axis, with an elevator that leads to a second one; the robot begins at its left end.
+/// A hall 20 m long and 4 m wide about the x axis, with an elevator that leads to a second one; the robot
+/// begins at its left end.
 const HALL: &str = r#"
 name = "hall"
 [[floor]]
@@ -382,7 +383,8 @@ fn refuses_nonsense_with_names_and_values() {
 }
 
 proptest! {
-    /// Whatever the motors are told, the truth stays finite, and the robot's middle within the hall, with the niche of the elevator's door.
+    /// Whatever the motors are told, the truth stays finite, and the robot's middle within the hall, with the
+    /// niche of the elevator's door.
     #[test]
     fn nothing_drives_through_walls(commands in proptest::collection::vec((-1.2f64..1.2, -1.2f64..1.2, 0.1f64..2.0), 1..12)) {
         let mut run = Run::new(Params::default(), HALL);

@@ -1,5 +1,5 @@
-//! A DWM1001 radio tag: ten times a second its distances to the nearest anchors, and the module's own idea of where it is
-//! (COF-130, note 2.3).
+//! A DWM1001 radio tag: ten times a second its distances to the nearest anchors, and the module's own idea of
+//! where it is (COF-130, note 2.3).
 
 mod params;
 mod position;

@@ -24,19 +24,19 @@ pub struct Params {
     /// The world file with the anchors, relative to the working directory; empty for none.
     #[schemars(extend("format" = "path"))]
     pub world: String,
-    /// From message to message; the module manages ten a second.
+    /// Time from one message to the next; the module manages ten a second.
     #[schemars(range(min = 100, max = 10000))]
     pub period_ms: u32,
-    /// Farther anchors are not heard.
+    /// Anchors farther away than this are not heard.
     #[schemars(range(min = 1.0, max = 200.0))]
     pub reach_m: f64,
     /// Standard deviation of a distance.
     #[schemars(range(min = 0.0, max = 2.0))]
     pub sigma_m: f64,
-    /// The share of distances that are wrong.
+    /// The share of distances that are wrong: too long, by `outlier_m`.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub outlier_fraction: f64,
-    /// By how much those are too long, as radio that came a longer way.
+    /// By how much wrong distances are too long, as radio that came a longer way.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub outlier_m: f64,
     /// The share of distances that are missing.
@@ -44,13 +44,13 @@ pub struct Params {
     pub drop_out_fraction: f64,
     /// Anchors that are never heard, by number.
     pub dead_anchors: Vec<u32>,
-    /// Where the antenna sits in the robot's frame: forward,
+    /// How far forward of the robot's centre the antenna sits.
     #[schemars(range(min = -2.0, max = 2.0))]
     pub antenna_x_m: f64,
-    /// to the left,
+    /// How far to the left of the robot's centre the antenna sits.
     #[schemars(range(min = -2.0, max = 2.0))]
     pub antenna_y_m: f64,
-    /// and above the floor.
+    /// How far above the floor the antenna sits.
     #[schemars(range(min = 0.0, max = 3.0))]
     pub antenna_z_m: f64,
 }

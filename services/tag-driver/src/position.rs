@@ -8,8 +8,9 @@ const FEWEST: usize = 3;
 /// Gauss and Newton's steps; a handful suffices from anywhere in a building.
 const STEPS: usize = 8;
 
-/// The place in the plane, at height `z_m`, that fits the distances best, beginning the search at `from`. `None` with fewer than three
-/// distances, with numbers that are none, or when the anchors stand in one line of sight.
+/// The place in the plane, at height `z_m`, that fits the distances best, beginning the search at `from`.
+/// `None` with fewer than three distances, with invalid numbers, or when the anchors stand in one line of
+/// sight.
 pub fn position_from(heard: &[AnchorRange], z_m: f64, from: Point2<f64>) -> Option<Point2<f64>> {
     if heard.len() < FEWEST {
         return None;

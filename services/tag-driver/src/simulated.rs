@@ -34,7 +34,7 @@ impl SimulatedTag {
         Self::in_world(params, &world, seed)
     }
 
-    /// The same in a world that is at hand already; `params.world` only names it.
+    /// A tag in a world that is at hand already; `params.world` only names it.
     ///
     /// # Errors
     /// When the world has no anchor that `dead_anchors` names.

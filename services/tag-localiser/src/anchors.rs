@@ -6,7 +6,8 @@ use messages::AnchorRange;
 pub(crate) const ANCHOR_LIMIT: usize = 32;
 /// How many anchors a DWM1001 uses at once (note 2.3): with so many heard, another's silence means nothing.
 const USED_AT_ONCE: usize = 4;
-/// Share of wrong readings, averaged over about ten, from which an anchor counts as always wrong, and below which as right again.
+/// Share of wrong readings, averaged over about ten, from which an anchor counts as always wrong, and below
+/// which as right again.
 const WRONG: f64 = 0.75;
 const RIGHT: f64 = 0.4;
 
@@ -54,7 +55,8 @@ impl Anchors {
         self.last_heard = heard;
     }
 
-    /// The slot of an anchor that is heard now; `None` when it was heard in this message already, or when the list is full.
+    /// The slot of an anchor that is heard now; `None` when it was heard in this message already, or when the
+    /// list is full.
     pub(crate) fn hear(&mut self, floor: i32, anchor: &AnchorRange) -> Option<usize> {
         let place = [anchor.x_m, anchor.y_m, anchor.z_m];
         let slot =
@@ -93,8 +95,9 @@ impl Anchors {
         }
     }
 
-    /// The anchors of a floor, as seen from a place. An anchor that is silent is dead only where it has been heard before, and only
-    /// if the tag had room for it: a building has more anchors than a tag hears at once.
+    /// The anchors of a floor, as seen from a place. An anchor that is silent is dead only where it has been
+    /// heard before, and only if the tag had room for it: a building has more anchors than a tag hears at
+    /// once.
     pub(crate) fn bits(&self, floor: i32, from: Option<[f64; 2]>, silent_messages: u32) -> AnchorBits {
         let mut bits = AnchorBits::default();
         for (slot, anchor) in self.known[..self.count].iter().enumerate() {

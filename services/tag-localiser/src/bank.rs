@@ -13,8 +13,8 @@ const PRUNE: f64 = 14.0;
 /// Hypotheses closer than this squared Mahalanobis distance, by their covariances' sum, become one.
 const MERGE: f64 = 0.3;
 
-/// Readings taken at one place share their errors, so they cannot vote again and again on which hypothesis is right. A path or a turn
-/// this long makes them independent; without any motion they count this share.
+/// Readings taken at one place share their errors, so they cannot vote again and again on which hypothesis is
+/// right. A path or a turn this long makes them independent; without any motion they count this share.
 const INDEPENDENT_M: f64 = 1.0;
 const INDEPENDENT_RAD: f64 = 2.0;
 const LEAST_NEWS: f64 = 0.1;
@@ -111,8 +111,9 @@ impl Bank {
         }
     }
 
-    /// Corrects every hypothesis by one range. `outlier` and `recovery` are the chances of an anchor's next reading to turn wrong
-    /// and to turn right. Returns how probably the range is good in the eyes of the best hypothesis.
+    /// Corrects every hypothesis by one range. `outlier` and `recovery` are the chances of an anchor's next
+    /// reading to turn wrong and to turn right. Returns how probably the range is good in the eyes of the
+    /// best hypothesis.
     pub(crate) fn hear(&mut self, reading: &RangeReading, outlier: f64, recovery: f64) -> f64 {
         let best = self.best_index();
         let mut verdict = 0.0;
@@ -129,8 +130,9 @@ impl Bank {
         verdict
     }
 
-    /// Corrects every hypothesis by one scalar that `compare` derives from it; those for which it is `None` keep their pose, and pay
-    /// for the measurement as if it were wrong. Returns the best hypothesis' verdict, if it had one.
+    /// Corrects every hypothesis by one scalar that `compare` derives from it; those for which it is `None`
+    /// keep their pose, and pay for the measurement as if it were wrong. Returns the best hypothesis'
+    /// verdict, if it had one.
     pub(crate) fn observe(
         &mut self,
         wrong_density: f64,
@@ -214,12 +216,14 @@ impl Bank {
     }
 
     fn sort(&mut self) {
-        // Unstable sorting needs no memory; equal weights keep an order that depends on nothing but the input.
+        // Unstable sorting needs no memory; equal weights keep an order that depends on nothing but the
+        // input.
         self.held.sort_unstable_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     }
 }
 
-/// One Gaussian for two that overlap, with their common mean and spread; the heavier one's opinion of the anchors.
+/// One Gaussian for two that overlap, with their common mean and spread; the heavier one's opinion of the
+/// anchors.
 fn join(heavy: &Hypothesis, light: &Hypothesis) -> Option<Hypothesis> {
     let apart = offset(light.pose, heavy.pose);
     // Far apart is the common case, and cheap to see.

@@ -1,4 +1,5 @@
-//! Corrections by what is no range: the module's own position, the hallway's direction, and the walls beside the robot.
+//! Corrections by what is no range: the module's own position, the hallway's direction, and the walls beside
+//! the robot.
 
 use crate::hypothesis::{Comparison, Hypothesis};
 use crate::walls::{self, HallwayWalls};
@@ -7,7 +8,8 @@ use geometry::{Point2, angle};
 use messages::{HeadingCorrection, Time, TofRanges};
 use nalgebra::RowVector3;
 
-/// A heading correction is never believed better than this: a wall is drawn, and measured from half a metre away.
+/// A heading correction is never believed better than this: a wall is drawn, and measured from half a metre
+/// away.
 const HEADING_SIGMA_RAD: f64 = 0.02;
 /// A wrong heading is any of half a turn.
 const WRONG_HEADING_DENSITY: f64 = std::f64::consts::FRAC_1_PI;
@@ -87,7 +89,8 @@ impl TagLocaliser {
         due && !self.walls.is_empty()
     }
 
-    /// Side sensors against walls. Only with few hypotheses left: walls are alike, and a wide belief would pick the wrong one.
+    /// Side sensors against walls. Only with few hypotheses left: walls are alike, and a wide belief would
+    /// pick the wrong one.
     pub(super) fn feel_walls(&mut self, ranges: &TofRanges) {
         let Some(floor) = self.floor else { return };
         let certain = self.bank.estimate().is_some_and(|one| one.sigma_m() < 0.5 && one.sigma_rad() < 0.3);

@@ -46,8 +46,8 @@ impl Hypothesis {
         Self { pose, covariance, log_weight, wrong: [wrong as f32; ANCHOR_LIMIT] }
     }
 
-    /// Moves by what odometry saw, in the robot's frame (Thrun et al. 2005, table 7.2, with noise that grows with the root of the
-    /// path, so that it does not depend on how often odometry reports).
+    /// Moves by what odometry saw, in the robot's frame (Thrun et al. 2005, table 7.2, with noise that grows
+    /// with the root of the path, so that it does not depend on how often odometry reports).
     pub(crate) fn advance(&mut self, motion: Pose2, noise: MotionNoise) {
         let (sine, cosine) = self.pose.heading_rad.sin_cos();
         let (x_m, y_m) = (cosine * motion.x_m - sine * motion.y_m, sine * motion.x_m + cosine * motion.y_m);
@@ -69,9 +69,10 @@ impl Hypothesis {
         self.covariance[(2, 2)] += sigma_rad * sigma_rad;
     }
 
-    /// Probabilistic data association with one measurement that is either good or from anywhere (Bar-Shalom, Willett and Tian 2011,
-    /// section 3.4): the correction counts as much as the measurement is probably good. Returns that probability. The weight changes
-    /// by the measurement's likelihood to the power of `news`.
+    /// Probabilistic data association with one measurement that is either good or from anywhere (Bar-Shalom,
+    /// Willett and Tian 2011, section 3.4): the correction counts as much as the measurement is probably
+    /// good. Returns that probability. The weight changes by the measurement's likelihood to the power of
+    /// `news`.
     pub(crate) fn correct(&mut self, seen: &Comparison, news: f64) -> f64 {
         let spread = self.covariance * seen.jacobian.transpose();
         let variance = (seen.jacobian * spread)[0] + seen.variance;
@@ -94,8 +95,8 @@ impl Hypothesis {
         share
     }
 
-    /// What a range from an anchor says: second-order extended Kalman filter (Bar-Shalom, Li and Kirubarajan 2001, section 10.3.2),
-    /// because near an anchor, or with a wide belief, circles are not straight.
+    /// What a range from an anchor says: second-order extended Kalman filter (Bar-Shalom, Li and Kirubarajan
+    /// 2001, section 10.3.2), because near an anchor, or with a wide belief, circles are not straight.
     pub(crate) fn compare_range(&self, reading: &RangeReading) -> Comparison {
         let (sine, cosine) = self.pose.heading_rad.sin_cos();
         let [forward_m, left_m] = reading.antenna_m;

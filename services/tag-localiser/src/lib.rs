@@ -1,9 +1,11 @@
-//! Where the robot is, from the ranges or positions of its radio tag, odometry, and the side sensors as a cross-check (COF-009).
+//! Where the robot is, from the ranges or positions of its radio tag, odometry, and the side sensors as a
+//! cross-check (COF-009).
 //!
-//! A bank of extended Kalman filters with probabilistic data association (Bar-Shalom, Willett and Tian 2011): a range is good, or it
-//! is from anywhere, and an anchor that was wrong tends to stay wrong, because what deflects or delays its signal stays where it is.
-//! Without a pose to begin with, every place where circles around anchors cross is tried with twelve headings, and driving tells
-//! them apart. Nothing is random, and a step allocates nothing.
+//! A bank of extended Kalman filters with probabilistic data association (Bar-Shalom, Willett and Tian 2011):
+//! a range is good, or it is from anywhere, and an anchor that was wrong tends to stay wrong, because what
+//! deflects or delays its signal stays where it is. Without a pose to begin with, every place where circles
+//! around anchors cross is tried with twelve headings, and driving tells them apart. Nothing is random, and a
+//! step allocates nothing.
 
 mod anchors;
 mod bank;
@@ -30,7 +32,8 @@ use messages::{
 use places::{PLACE_LIMIT, Places};
 use serde::{Deserialize, Serialize};
 
-/// What a step sees. A message seen before is recognised by its stamp and count, and not used again, odometry excepted, which is a state.
+/// What a step sees. A message seen before is recognised by its stamp and count, and not used again, odometry
+/// excepted, which is a state.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Inputs<'a> {
     /// Dead reckoning; its increments are used.
@@ -55,7 +58,8 @@ const KNOWN_SIGMA_M: f64 = 0.7;
 const KNOWN_SIGMA_RAD: f64 = 0.5;
 /// From this share of rejected readings on, averaged over about ten, the estimate is degraded.
 const MANY_REJECTED: f64 = 0.3;
-/// From this share of side readings on that contradict the walls, though they agree with each other, averaged over about ten frames, the estimate is degraded.
+/// From this share of side readings on that contradict the walls, though they agree with each other, averaged
+/// over about ten frames, the estimate is degraded.
 const SIDES_DISAGREE: f64 = 0.8;
 /// Uncertainty that each tag message adds, so that a robot at rest can still be pushed.
 const RESTLESS_SIGMA_M: f64 = 0.005;
@@ -84,7 +88,7 @@ pub struct TagLocaliser {
     known: bool,
 }
 
-/// A belief that was taken over is at least so uncertain: it is some moments old.
+/// The least uncertainty of a belief that was taken over: it is some moments old.
 const RESTORED_SIGMA_M: f64 = 0.05;
 const RESTORED_SIGMA_RAD: f64 = 0.01;
 
@@ -136,7 +140,8 @@ impl TagLocaliser {
         })
     }
 
-    /// What a successor needs to go on where this one was; `None` while the robot is not known to be anywhere.
+    /// What a successor needs to go on where this one was; `None` while the robot is not known to be
+    /// anywhere.
     pub fn snapshot(&self) -> Option<Snapshot> {
         let best = self.bank.estimate().filter(|best| self.known && best.sigma_m() < KNOWN_SIGMA_M)?;
         let pair = |pose: Pose2| [pose.x_m, pose.y_m, pose.heading_rad];
@@ -149,7 +154,8 @@ impl TagLocaliser {
         })
     }
 
-    /// Takes over the belief of a predecessor, before the first step. Odometry tells how far the robot went meanwhile.
+    /// Takes over the belief of a predecessor, before the first step. Odometry tells how far the robot went
+    /// meanwhile.
     pub fn restore(&mut self, snapshot: &Snapshot) {
         let Snapshot { pose, sigma_m, sigma_rad, floor, odometry } = *snapshot;
         let numbers = pose.into_iter().chain(odometry.into_iter().flatten()).chain([sigma_m, sigma_rad]);
@@ -191,7 +197,8 @@ impl TagLocaliser {
         let motion = self.odometry.map_or(Pose2::IDENTITY, |last| last.to(pose));
         self.odometry = Some(pose);
         if motion.position().coords.norm() > self.params.odometry_jump_m {
-            // The driver began anew, or drove unseen; nothing is known of the motion but that it was not this.
+            // The driver began anew, or drove unseen; nothing is known of the motion but that it was not
+            // this.
             self.bank.blur(0.5, 0.2);
             return;
         }
@@ -237,7 +244,8 @@ impl TagLocaliser {
         self.try_elsewhere(readings, explained, antenna_of(tag));
     }
 
-    /// Whether a message from the anchors of a floor is of the robot's floor; changes the floor after enough of them.
+    /// Whether a message from the anchors of a floor is of the robot's floor; changes the floor after enough
+    /// of them.
     fn is_on_floor(&mut self, floor: i32) -> bool {
         match self.floor {
             None => self.floor = Some(floor),
@@ -256,8 +264,8 @@ impl TagLocaliser {
         true
     }
 
-    /// Ranges that are numbers, of enough quality, no nearer than the anchor's height and no farther than radio reaches; the others
-    /// are rejected.
+    /// Ranges that are numbers, of enough quality, no nearer than the anchor's height and no farther than
+    /// radio reaches; the others are rejected.
     fn usable_ranges(&mut self, tag: &TagRanges, usable: &mut [RangeReading; ANCHOR_CAPACITY]) -> usize {
         let (floor, antenna_m) = (tag.floor, antenna_of(tag));
         self.anchors.begin(tag.heard().len());
@@ -321,13 +329,15 @@ impl TagLocaliser {
             return;
         }
         let places = Places::find(readings);
-        // Two anchors always agree on some place; the ranges that do not agree with it are judged by what follows.
+        // Two anchors always agree on some place; the ranges that do not agree with it are judged by what
+        // follows.
         for place in places.as_slice() {
             self.bank.scatter(place.at_m, antenna_m, 3.0 * self.params.range_sigma_m, 0.0, NEW_WRONG);
         }
     }
 
-    /// When the readings contradict the belief for long, and agree among each other on another place, that place is tried beside it.
+    /// When the readings contradict the belief for long, and agree among each other on another place, that
+    /// place is tried beside it.
     fn try_elsewhere(&mut self, readings: &[RangeReading], explained: usize, antenna_m: [f64; 2]) {
         let contradicted = 2 * explained < readings.len().max(1) + 1 && explained < 3;
         // Nothing explained at all weighs double.

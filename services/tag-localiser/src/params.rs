@@ -16,7 +16,7 @@ pub struct Params {
     /// Standard deviation of a good range, its slowly changing bias included.
     #[schemars(range(min = 0.01, max = 2.0))]
     pub range_sigma_m: f64,
-    /// Ranges beyond this are no readings.
+    /// Ranges beyond this are rejected.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub longest_range_m: f64,
     /// Readings of less quality are rejected.
@@ -25,7 +25,8 @@ pub struct Params {
     /// Standard deviation of the module's own position, used where there are fewer than two ranges.
     #[schemars(range(min = 0.01, max = 5.0))]
     pub position_sigma_m: f64,
-    /// Chance that an anchor heard rightly is heard wrongly the next time: an outlier, or the begin of a wrong spell.
+    /// Chance that an anchor heard rightly is heard wrongly the next time: an outlier, or the begin of a
+    /// wrong spell.
     #[schemars(range(min = 0.0001, max = 0.5))]
     pub outlier_chance: f64,
     /// Chance that an anchor heard wrongly is heard rightly the next time.
@@ -43,7 +44,8 @@ pub struct Params {
     /// Odometry that jumps farther from one message to the next has begun anew.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub odometry_jump_m: f64,
-    /// The published place is never claimed to be better than this: ranges share biases that averaging does not remove.
+    /// The published place is never claimed to be better than this: ranges share biases that averaging does
+    /// not remove.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub floor_sigma_m: f64,
     /// Standard deviation of a side sensor's distance to a wall of the world, the drawing's error included.
@@ -55,13 +57,14 @@ pub struct Params {
     /// Without a tag message for this long the estimate is degraded.
     #[schemars(range(min = 0.1, max = 600.0))]
     pub tag_timeout_s: f64,
-    /// An anchor not heard for that many tag messages, near enough to be heard, is dead.
+    /// An anchor near enough to be heard, but not heard for this many tag messages, is dead.
     #[schemars(range(min = 2, max = 10000))]
     pub silent_messages: u32,
-    /// That many tag messages in a row from another floor mean that the robot is there.
+    /// Tag messages in a row from another floor that mean that the robot is there.
     #[schemars(range(min = 1, max = 1000))]
     pub floor_messages: u32,
-    /// After that many tag messages in a row that the estimate cannot explain, and another place can, that place is tried as well.
+    /// Tag messages in a row that the estimate cannot explain, and another place can, after which that place
+    /// is tried as well.
     #[schemars(range(min = 1, max = 1000))]
     pub recovery_messages: u32,
     /// With a larger standard deviation of the place the robot is lost.

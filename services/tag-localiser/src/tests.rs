@@ -247,7 +247,8 @@ fn hallway_walls() -> HallwayWalls {
     )
 }
 
-/// Errors of place (m) and heading (rad) while the robot drives through the hallway, from the tenth second on.
+/// Errors of place (m) and heading (rad) while the robot drives through the hallway, from the tenth second
+/// on.
 fn drive_hallway(
     seed: u64,
     params: Params,
@@ -302,7 +303,8 @@ fn the_hallway_is_driven_within_its_bounds() {
 
 #[test]
 fn the_claimed_covariance_is_honest() {
-    // The normalised error squared of a Gaussian in two dimensions averages 2; an overconfident filter is far above.
+    // The normalised error squared of a Gaussian in two dimensions averages 2; an overconfident filter is far
+    // above.
     let mut total = 0.0;
     let mut count = 0.0;
     for seed in 11..=16 {

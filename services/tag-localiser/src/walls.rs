@@ -57,9 +57,9 @@ impl HallwayWalls {
         self.walls.is_empty()
     }
 
-    /// Which side sensors see walls and nothing else, as far as they can tell among themselves: the two of a side must see one
-    /// straight wall, and right and left together must measure the hallway's width, whatever the robot's place in it. A door that
-    /// no drawing shows, or a person, breaks one of the two.
+    /// Which side sensors see walls and nothing else, as far as they can tell among themselves: the two of a
+    /// side must see one straight wall, and right and left together must measure the hallway's width,
+    /// whatever the robot's place in it. A door that no drawing shows, or a person, breaks one of the two.
     pub(crate) fn agreeing(
         &self,
         best: &Hypothesis,
@@ -79,13 +79,15 @@ impl HallwayWalls {
                 Agreeing { right: true, left: true, caution: 1.0 }
             }
             (Some(_), Some(_)) | (None, None) => Agreeing::default(),
-            // One side alone has nothing to be measured against: half as good, and not when something may stand before the wall.
+            // One side alone has nothing to be measured against: half as good, and not when something may
+            // stand before the wall.
             (Some(alone_m), None) | (None, Some(alone_m)) if alone_m < -2.0 * sigma_m => Agreeing::default(),
             (right, left) => Agreeing { right: right.is_some(), left: left.is_some(), caution: 4.0 },
         }
     }
 
-    /// The reading of one side sensor against the wall that a hypothesis expects there; `None` when there is no wall to speak of.
+    /// The reading of one side sensor against the wall that a hypothesis expects there; `None` when there is
+    /// no wall to speak of.
     pub(crate) fn compare(
         &self,
         hypothesis: &Hypothesis,
@@ -114,7 +116,8 @@ impl HallwayWalls {
         if square.abs() < SQUAREST {
             return None;
         }
-        // distance = normal . (wall - eye) / normal . axis, derived by the pose; the eye turns around the robot's centre.
+        // distance = normal . (wall - eye) / normal . axis, derived by the pose; the eye turns around the
+        // robot's centre.
         let lever = Vector2::new(eye.x_m - hypothesis.pose.x_m, eye.y_m - hypothesis.pose.y_m);
         let swing = |v: Vector2<f64>| normal.dot(&Vector2::new(-v.y, v.x));
         let jacobian = RowVector3::new(
@@ -149,7 +152,8 @@ mod tests {
     use super::*;
     use messages::{RangeStatus, RangeStatusName};
 
-    /// Which sides are believed in a hallway with walls at ±0.85 m, by a robot in its middle that reads these side distances.
+    /// Which sides are believed in a hallway with walls at ±0.85 m, by a robot in its middle that reads these
+    /// side distances.
     #[track_caller]
     fn check(right_m: f32, left_m: f32, expected: [bool; 2]) {
         let line = |y_m: f64| Segment::new(Point2::new(-9.0, y_m), Point2::new(9.0, y_m));

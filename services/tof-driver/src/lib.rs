@@ -1,5 +1,5 @@
-//! Eight VL53L1X time-of-flight sensors around the coffee robot (COF-020 to COF-030): one frame a period, every reading with the
-//! status that the sensor gives it (note 2.1).
+//! Eight VL53L1X time-of-flight sensors around the coffee robot (COF-020 to COF-030): one frame a period,
+//! every reading with the status that the sensor gives it (note 2.1).
 
 mod params;
 mod simulated;

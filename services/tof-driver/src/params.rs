@@ -38,7 +38,7 @@ pub enum NoiseProfile {
     Paper,
     /// The manufacturer's ±20 mm in the dark, ±25 mm in strong light, taken as three standard deviations.
     Datasheet,
-    /// None: for comparisons.
+    /// No noise: for comparisons.
     None,
 }
 
@@ -51,11 +51,11 @@ pub struct Params {
     /// The world file of the simulated device, relative to the working directory; empty for an empty plane.
     #[schemars(extend("format" = "path"))]
     pub world: String,
-    /// From frame to frame. All sensors range at the same time (X-2C).
+    /// Time from one frame to the next. All sensors measure at the same time (X-2C).
     #[schemars(range(min = 24, max = 1000))]
     pub period_ms: u32,
-    /// How long a sensor collects light for a reading: at least 20 ms in the short mode and 33 ms in the others; 4 ms more must fit
-    /// into the period.
+    /// How long a sensor collects light for a reading: at least 20 ms in the short mode and 33 ms in the
+    /// others; 4 ms more must fit into the period.
     #[schemars(range(min = 20, max = 996))]
     pub timing_budget_ms: u32,
     /// The distance mode.
@@ -67,7 +67,7 @@ pub struct Params {
     /// Readings above this are noise (COF-030).
     #[schemars(range(min = 0.2, max = 4.0))]
     pub noise_above_m: f64,
-    /// The share of readings above it that are no reading.
+    /// The share of readings above `noise_above_m` that are "no target".
     #[schemars(range(min = 0.0, max = 1.0))]
     pub no_target_fraction: f64,
     /// Height of the sensors above the floor (COF-026).
@@ -76,7 +76,7 @@ pub struct Params {
     /// Full field of view, across and upright (COF-021).
     #[schemars(range(min = 15.0, max = 27.0))]
     pub field_of_view_deg: f64,
-    /// Rays across and rays upright in a simulated field of view.
+    /// Rays across, and as many upright, in a simulated field of view.
     #[schemars(range(min = 1, max = 16))]
     pub rays_per_side: u32,
     /// What fills this share of the field of view is always seen; what fills less is seen in proportion.

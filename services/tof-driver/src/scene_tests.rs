@@ -4,7 +4,8 @@ use crate::tests::{HALLWAY, at, frame, sensors, silent_noise, truth};
 use crate::{Params, TofDevice};
 use messages::{BodyKind, Reading, Stamped, TofRanges, TrueBody};
 
-/// The readings of some sensors while the robot drives along x at `y_m`, in steps of 4 cm, from `from_m` to `to_m`.
+/// The readings of some sensors while the robot drives along x at `y_m`, in steps of 4 cm, from `from_m` to
+/// `to_m`.
 fn drive(params: Params, furniture: &str, y_m: f64, from_m: f64, to_m: f64) -> Vec<(f64, TofRanges)> {
     let mut device = sensors(params, &format!("{HALLWAY}\n[[furniture]]\nfloor = 2\n{furniture}\n"));
     let steps = ((to_m - from_m) / 0.04).round() as u32;
@@ -27,8 +28,8 @@ fn sees_below(ranges: &TofRanges, sensor: usize, limit_m: f32) -> bool {
 
 #[test]
 fn the_mail_carts_low_shelf_vanishes_at_close_range() {
-    // Against the right wall, its front edge at x = 0; the robot close to the right wall, so that the two sensors in the middle look
-    // between the bars (COF-122).
+    // Against the right wall, its front edge at x = 0; the robot close to the right wall, so that the two
+    // sensors in the middle look between the bars (COF-122).
     let cart = "kind = \"mail-cart\"\npose = { x_m = 0.45, y_m = -0.60 }";
     let mut device = sensors(silent_noise(), &format!("{HALLWAY}\n[[furniture]]\nfloor = 2\n{cart}\n"));
     let mut share_seen = |edge_m: f64| {
@@ -43,7 +44,8 @@ fn the_mail_carts_low_shelf_vanishes_at_close_range() {
 
 #[test]
 fn the_pole_of_a_spinning_chair_flickers() {
-    // The pole's front lies 0.35 m before sensor 4, the base below its cone: the sensor sees now the pole, and now past it (COF-123).
+    // The pole's front lies 0.35 m before sensor 4, the base below its cone: the sensor sees now the pole,
+    // and now past it (COF-123).
     let chair = "kind = \"spinning-chair\"\npose = { x_m = 0.0, y_m = 0.0575 }";
     let mut device = sensors(silent_noise(), &format!("{HALLWAY}\n[[furniture]]\nfloor = 2\n{chair}\n"));
     let mut share_seen = |aside_m: f64| {

@@ -46,7 +46,7 @@ impl SimulatedTof {
         Ok(Self::in_world(params, &world, seed))
     }
 
-    /// The same in a world that is at hand already.
+    /// Sensors in a world that is at hand already.
     pub fn in_world(params: Params, world: &World, seed: u64) -> Self {
         let half_rad = 0.5 * params.field_of_view_deg.to_radians();
         let side = params.rays_per_side as usize;
@@ -74,7 +74,8 @@ impl SimulatedTof {
         }
     }
 
-    /// What one sensor would read without noise, if it sees anything: the nearest thing that fills enough of its view.
+    /// What one sensor would read without noise, if it sees anything: the nearest thing that fills enough of
+    /// its view.
     fn look(&mut self, truth: &WorldTruth, mount: Pose2) -> Option<f64> {
         let scene = self.surroundings.scene(truth.floor)?;
         let robot = Pose2 { x_m: truth.x_m, y_m: truth.y_m, heading_rad: truth.heading_rad };

@@ -74,7 +74,8 @@ fn looks_at_a_wall_ahead_with_all_four_front_sensors() {
     check((0.0, 0.2, std::f64::consts::FRAC_PI_2), [aside, aside, ahead, ahead, ahead, ahead, aside, aside]);
 }
 
-/// The angle that the paper's formula gives for a robot turned by `true_deg` (COF-081), seen by sensors without noise.
+/// The angle that the paper's formula gives for a robot turned by `true_deg` (COF-081), seen by sensors
+/// without noise.
 #[track_caller]
 fn check_angle(y_m: f64, true_deg: f64, tolerance_deg: f64) {
     let ranges = frame(&mut sensors(silent_noise(), HALLWAY), &truth(0.0, y_m, true_deg.to_radians()));

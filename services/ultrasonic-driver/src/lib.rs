@@ -1,5 +1,6 @@
-//! An ultrasonic sensor on a servo above the robot's centre of motion (NXT-012, NXT-013, NXT-030 to NXT-037). On an order it turns once
-//! around and publishes a scan with a reading a degree; then it turns back and watches ahead (NXT-025 to NXT-027).
+//! An ultrasonic sensor on a servo above the robot's centre of motion (NXT-012, NXT-013, NXT-030 to NXT-037).
+//! On an order it turns once around and publishes a scan with a reading a degree; then it turns back and
+//! watches ahead (NXT-025 to NXT-027).
 
 mod params;
 mod simulated;
@@ -33,7 +34,7 @@ pub enum DeviceError {
 /// What one ping brings back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reading {
-    /// An echo from so far.
+    /// An echo from this distance.
     Echo {
         /// Half of the way of the sound.
         range_m: f64,

@@ -19,11 +19,12 @@ pub enum Device {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseProfile {
-    /// A cone whose nearest echo counts, with a centimetre of noise that grows with the angle of incidence, lost and late echoes, a least
-    /// and a largest range (NXT-032 to NXT-034, NXT-037, NXT-101).
+    /// A cone whose nearest echo counts, with a centimetre of noise that grows with the angle of incidence,
+    /// lost and late echoes, a least and a largest range (NXT-032 to NXT-034, NXT-037, NXT-101).
     #[default]
     Paper,
-    /// As the BotSim simulator has it (note 1.2): a single ray whose end scatters in x and in y, and no largest range.
+    /// As the BotSim simulator has it (note 1.2): a single ray whose end scatters in x and in y, and no
+    /// largest range.
     Botsim,
     /// A cone without any error: for comparisons.
     None,
@@ -38,7 +39,7 @@ pub struct Params {
     /// The world file of the simulated device, relative to the working directory; empty for an empty plane.
     #[schemars(extend("format" = "path"))]
     pub world: String,
-    /// From step to step, and from one look ahead to the next.
+    /// Time from one step to the next, and from one look ahead to the next.
     #[schemars(range(min = 5, max = 200))]
     pub period_ms: u32,
     /// Readings of a scan, evenly all around (NXT-027: one a degree).
@@ -47,10 +48,10 @@ pub struct Params {
     /// How long the sensor takes for a reading of a scan, the servo's turn included.
     #[schemars(range(min = 1, max = 200))]
     pub reading_ms: u32,
-    /// So many times faster the servo turns back.
+    /// How many times faster than in a scan the servo turns back.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub return_speedup: f64,
-    /// Nothing nearer can be measured (note 1.3, unconfirmed).
+    /// The smallest reading: nothing nearer can be measured (note 1.3, unconfirmed).
     #[schemars(range(min = 0.0, max = 0.2))]
     pub range_min_m: f64,
     /// The largest reading, which says that there was no echo: 255 cm.
@@ -59,7 +60,7 @@ pub struct Params {
     /// Half of the cone's opening angle (X-06, unconfirmed).
     #[schemars(range(min = 0.0, max = 45.0))]
     pub half_cone_deg: f64,
-    /// From one ray of the simulated cone to the next.
+    /// Angle from one ray of the simulated cone to the next.
     #[schemars(range(min = 0.1, max = 10.0))]
     pub ray_step_deg: f64,
     /// How readings err.
@@ -67,28 +68,30 @@ pub struct Params {
     /// Standard deviation of a reading straight on a wall (NXT-101).
     #[schemars(range(min = 0.0, max = 0.2))]
     pub sigma_m: f64,
-    /// The sensor counts whole steps of this; 0 for none.
+    /// The sensor counts whole steps of this; 0 means no steps.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub resolution_m: f64,
-    /// Weak echoes are noticed late: by so many times `sigma_m` and the squared tangent of the angle of incidence (NXT-034) ...
+    /// Weak echoes are noticed late: by this times `sigma_m` times the squared tangent of the angle of
+    /// incidence (NXT-034), up to `latest_m`.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub incidence_growth: f64,
-    /// ... but by no more than this.
+    /// The most by which an echo is noticed late.
     #[schemars(range(min = 0.0, max = 2.0))]
     pub latest_m: f64,
-    /// An edge, where a wall ends, is heard as well as a wall that is met at this angle of incidence. Corners are heard well.
+    /// An edge, where a wall ends, is heard as well as a wall that is met at this angle of incidence. Corners
+    /// are heard well.
     #[schemars(range(min = 0.0, max = 90.0))]
     pub edge_deg: f64,
-    /// From this angle of incidence on echoes begin to be lost.
+    /// Angle of incidence from which echoes begin to be lost.
     #[schemars(range(min = 0.0, max = 89.0))]
     pub lost_from_deg: f64,
-    /// At this angle of incidence as many are lost as ever.
+    /// Angle of incidence from which `lost_share` of the echoes is lost.
     #[schemars(range(min = 1.0, max = 90.0))]
     pub lost_to_deg: f64,
-    /// The share that is lost there.
+    /// The share of echoes that is lost from `lost_to_deg` on.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub lost_share: f64,
-    /// The share of the lost ones that come back late, by way of another wall; the others are no reading.
+    /// The share of lost echoes that come back late, by way of another wall; the others give no reading.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub late_share: f64,
 }

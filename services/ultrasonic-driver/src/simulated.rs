@@ -17,9 +17,9 @@ const HEIGHT_M: f64 = 0.10;
 const FARTHEST_M: f64 = 20.0;
 /// So near to a wall's end, the end is heard.
 const END_M: f64 = 0.015;
-/// Ends of walls that are so near to each other are one.
+/// Ends of walls that are nearer to each other than this are one.
 const SAME_M: f64 = 1e-4;
-/// A ray that leaves a wall begins so far from it.
+/// How far from a wall a ray that leaves it begins.
 const OFF_WALL_M: f64 = 1e-6;
 
 /// A sensor that casts its cones into the world of a file, as `world/truth` has it.
@@ -41,7 +41,7 @@ impl SimulatedSonar {
         Ok(Self::in_world(params, &world, seed))
     }
 
-    /// The same in a world that is at hand already.
+    /// A sensor in a world that is at hand already.
     pub fn in_world(params: Params, world: &World, seed: u64) -> Self {
         Self { surroundings: Surroundings::new(world), rng: Pcg64::seed_from_u64(seed), seen: None, params }
     }
@@ -79,8 +79,8 @@ impl SimulatedSonar {
         rays.min_by(|a, b| a.0.range_m.total_cmp(&b.0.range_m))
     }
 
-    /// What is heard of an echo: errors grow with the angle of incidence, until the sound does not come back at all, or by way of another
-    /// wall (NXT-033, NXT-034).
+    /// What is heard of an echo: errors grow with the angle of incidence, until the sound does not come back
+    /// at all, or by way of another wall (NXT-033, NXT-034).
     fn echo(&self, scene: &Scene, hit: Hit, ray: &Ray, noise: [f64; 2], lost: f64, late: f64) -> Option<f64> {
         let params = &self.params;
         // A corner sends sound back wherever it comes from, an edge a part of it.
@@ -124,10 +124,11 @@ impl SimulatedSonar {
 /// The end of a wall, as a sensor sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum End {
-    /// The sensor looks between two walls into the corner that they make: the sound comes back by way of both.
+    /// The sensor looks between two walls into the corner that they make: the sound comes back by way of
+    /// both.
     Corner,
-    /// The wall ends there, or another begins behind it: the sound is scattered, or comes back from the one of them that is met the least
-    /// askew.
+    /// The wall ends there, or another begins behind it: the sound is scattered, or comes back from the one
+    /// of them that is met the least askew.
     Edge { faced_rad: f64 },
 }
 

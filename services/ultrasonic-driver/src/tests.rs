@@ -83,7 +83,8 @@ fn errors_grow_with_the_angle_of_incidence() {
 
 #[test]
 fn corners_are_heard_and_edges_less() {
-    // A corner within the cone answers as a wall does that faces the sensor; an edge as one that is met askew.
+    // A corner within the cone answers as a wall does that faces the sensor; an edge as one that is met
+    // askew.
     let spread = |world: &str, place: Pose2| {
         let world = World::parse(world).expect("a world");
         let params = Params {

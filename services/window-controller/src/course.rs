@@ -5,7 +5,8 @@ use geometry::Pose2;
 use messages::Waypoint;
 use nalgebra::Point2;
 
-/// Progress is looked for so far beyond the last, so that a path that comes back to itself is not cut short.
+/// How far beyond the last progress it is looked for, so that a path that comes back to itself is not cut
+/// short.
 const SEARCH_M: f64 = 1.0;
 
 /// Progress along the present path.
@@ -26,7 +27,8 @@ pub(crate) struct Aim {
 }
 
 impl Course {
-    /// Where to drive from `pose` on the path `(request, revision)`; `None` without waypoints or with nonsense among them.
+    /// Where to drive from `pose` on the path `(request, revision)`; `None` without waypoints or with
+    /// nonsense among them.
     pub(crate) fn aim(
         &mut self,
         path: (u64, u64),
@@ -73,7 +75,7 @@ fn segments(waypoints: &[Waypoint]) -> impl Iterator<Item = (Point2<f64>, Point2
     waypoints.windows(2).map(move |ends| (place(&ends[0]), place(&ends[1])))
 }
 
-/// The place so far along the path; `None` beyond its end.
+/// The place this far along the path; `None` beyond its end.
 fn place_at(waypoints: &[Waypoint], along_m: f64) -> Option<Point2<f64>> {
     let mut begin_m = 0.0;
     for (from, to) in segments(waypoints) {

@@ -1,8 +1,9 @@
-//! Follows paths and avoids obstacles by choosing, in each step, the best of the velocities that the wheels can reach by the next one and
-//! from which the robot can still stop: the dynamic window approach (Fox, Burgard, Thrun 1997). Takes the place of `fuzzy-controller`.
+//! Follows paths and avoids obstacles by choosing, in each step, the best of the velocities that the wheels
+//! can reach by the next one and from which the robot can still stop: the dynamic window approach (Fox,
+//! Burgard, Thrun 1997). Takes the place of `fuzzy-controller`.
 //!
-//! Who decides, first to last: bad or stale input stops; something close ahead forbids driving on; a target far to the side is turned to;
-//! else the window's best velocity, and if none is admissible, zero at once.
+//! Who decides, first to last: bad or stale input stops; something close ahead forbids driving on; a target
+//! far to the side is turned to; else the window's best velocity, and if none is admissible, zero at once.
 
 mod course;
 mod memory;
@@ -27,7 +28,7 @@ use window::{Scene, choose};
 const LAG_S: f64 = 0.3;
 /// Turns on the spot aim below the speed from which they could just stop.
 const TURN_SHARE: f64 = 0.6;
-/// Creeping turns so fast for each radian beside its heading.
+/// How fast creeping turns for each radian beside its heading.
 const CREEP_TURN_PER_S: f64 = 1.5;
 
 /// The newest of each message, as far as there is one.

@@ -5,13 +5,14 @@ use geometry::Pose2;
 use messages::{RangeScan, Reading, TOF_COUNT, Time, TofRanges};
 use nalgebra::Point2;
 
-/// A reading is a cone 15 to 27 degrees wide (COF-021): its middle and points this far to both sides stand for it.
+/// A reading is a cone 15 to 27 degrees wide (COF-021): its middle and points this far to both sides stand
+/// for it.
 const CONE_SIDE_RAD: f64 = 0.10;
 /// Readings from here on scatter (COF-030) and are too far away to matter.
 const RANGE_MAX_M: f64 = 1.0;
 /// Points nearer to each other than this are one.
 const GRAIN_M: f64 = 0.06;
-/// Of a scan only so many beams count, evenly spread.
+/// The most beams of a scan that count, evenly spread.
 const BEAMS_MAX: usize = 60;
 /// More points than this are not kept.
 const POINTS_MAX: usize = 160;
@@ -25,7 +26,8 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// Takes a frame of the eight sensors. The nearest in front; `None` if a sensor is faulty or silent for too long.
+    /// Takes a frame of the eight sensors. The nearest in front; `None` if a sensor is faulty or silent for
+    /// too long.
     pub(crate) fn take_tof(
         &mut self,
         now: Time,

@@ -1,4 +1,5 @@
-//! The parameters of the window controller. Those that `fuzzy-controller` has too have its names, so that a graph's table suits both.
+//! The parameters of the window controller. Those that `fuzzy-controller` has too have its names, so that a
+//! graph's table suits both.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -44,7 +45,7 @@ pub struct Params {
     /// How far ahead on the path the robot aims.
     #[schemars(range(min = 0.05, max = 5.0))]
     pub lookahead_m: f64,
-    /// So far ahead a velocity's course is followed to see where it leads.
+    /// How far ahead a velocity's course is followed to see where it leads.
     #[schemars(range(min = 0.1, max = 5.0))]
     pub horizon_s: f64,
     /// Above this error the robot turns on the spot.
@@ -65,13 +66,13 @@ pub struct Params {
     /// What the objective gives for a course towards the target.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub heading_weight: f64,
-    /// What it gives for the way to the first obstacle.
+    /// What the objective gives for the way to the first obstacle.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub clearance_weight: f64,
-    /// What it gives for speed.
+    /// What the objective gives for speed.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub velocity_weight: f64,
-    /// Beyond so much way to the first obstacle, more is no better.
+    /// Beyond this much way to the first obstacle, more is no better.
     #[schemars(range(min = 0.01, max = 10.0))]
     pub front_trigger_m: f64,
     /// At top speed courses keep this distance at the sides, slower ones less in proportion.
@@ -80,7 +81,7 @@ pub struct Params {
     /// Below this clearance in front the robot brakes at once, and then only turns.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub brake_distance_m: f64,
-    /// What was seen is remembered for so long: eight sensors leave most directions unseen.
+    /// How long what was seen is remembered: eight sensors leave most directions unseen.
     #[schemars(range(min = 0, max = 60000))]
     pub memory_ms: u64,
     /// The hull ahead of the turning centre.

@@ -36,7 +36,8 @@ fn turns_meet_what_the_corners_sweep() {
     let corner_rad = (0.35_f64.powi(2) - 0.25_f64.powi(2)).sqrt().atan2(0.25);
     check_time(0.0, 1.0, 0.0, 0.35, corner_rad);
     check_time(0.0, -1.0, 0.0, 0.35, corner_rad);
-    // Around (0, 1): the point straight ahead on the centre's circle meets the front edge after 90 degrees less its own angle.
+    // Around (0, 1): the point straight ahead on the centre's circle meets the front edge after 90 degrees
+    // less its own angle.
     let front_rad = FRAC_PI_2 - 0.3_f64.asin();
     check_time(1.0, 1.0, 1.0, 1.0, front_rad);
     check_time(1.0, -1.0, 1.0, -1.0, front_rad);

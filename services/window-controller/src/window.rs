@@ -1,11 +1,13 @@
-//! The choice among velocities: Fox, Burgard and Thrun 1997, "The dynamic window approach to collision avoidance".
+//! The choice among velocities: Fox, Burgard and Thrun 1997, "The dynamic window approach to collision
+//! avoidance".
 
 use crate::Params;
 use geometry::Pose2;
 use nalgebra::Point2;
 use std::f64::consts::{PI, TAU};
 
-/// How finely the window is searched: speeds forward, turning speeds (odd, so that the present one is among them).
+/// How finely the window is searched: speeds forward, turning speeds (odd, so that the present one is among
+/// them).
 const FORWARD_STEPS: usize = 9;
 const TURN_STEPS: usize = 17;
 /// Slower turns are straight lines.
@@ -33,7 +35,8 @@ impl Hull {
         x > -self.rear_m && x < self.front_m && y.abs() < self.side_m
     }
 
-    /// After how many seconds at this velocity the hull meets a point of the robot's frame; infinite if never within a full turn.
+    /// After how many seconds at this velocity the hull meets a point of the robot's frame; infinite if never
+    /// within a full turn.
     pub(crate) fn time_to(&self, velocity: Velocity, point: Point2<f64>) -> f64 {
         let Velocity { forward_mps, turn_rad_per_s } = velocity;
         let (x, y) = (point.x, point.y);
@@ -42,7 +45,8 @@ impl Hull {
             let meets = y.abs() < self.side_m && way_m >= 0.0 && forward_mps != 0.0;
             return if meets { way_m / forward_mps.abs() } else { f64::INFINITY };
         }
-        // Seen from the robot the point runs on a circle around the turn's centre (0, centre_y), against the turn.
+        // Seen from the robot the point runs on a circle around the turn's centre (0, centre_y), against the
+        // turn.
         let centre_y = forward_mps / turn_rad_per_s;
         let (from_y, radius2) = (y - centre_y, x * x + (y - centre_y).powi(2));
         let begin_rad = from_y.atan2(x);
@@ -165,7 +169,8 @@ fn time_to_contact(velocity: Velocity, scene: &Scene<'_>, params: &Params) -> f6
     let wide = Hull { side_m: bare.side_m + params.side_trigger_m * share, ..bare };
     let time = |point: &Point2<f64>| {
         if bare.holds(point.x, point.y) {
-            // The robot cannot be where something is: an error of the memory, unless the robot would drive into it.
+            // The robot cannot be where something is: an error of the memory, unless the robot would drive
+            // into it.
             return if point.x > 0.5 * bare.front_m && velocity.forward_mps > 0.0 {
                 0.0
             } else {
@@ -179,7 +184,8 @@ fn time_to_contact(velocity: Velocity, scene: &Scene<'_>, params: &Params) -> f6
     scene.points.iter().map(time).fold(f64::INFINITY, f64::min)
 }
 
-/// The mean over the neighbours that are admissible too (the paper's σ): keeps the robot off the rim of what is possible.
+/// The mean over the neighbours that are admissible too (the paper's σ): keeps the robot off the rim of what
+/// is possible.
 fn smoothed(scores: &[[Option<f64>; TURN_STEPS]; FORWARD_STEPS], row: usize, column: usize) -> Option<f64> {
     let own = scores[row][column]?;
     let (mut sum, mut count) = (2.0 * own, 2.0);

@@ -43,7 +43,8 @@ pub(crate) enum Kind {
     Experiment,
 }
 
-/// Services that are asked with damaged parameters: all that have other than numbers, and some that have many.
+/// Services that are asked with damaged parameters: all that have other than numbers, and some that have
+/// many.
 pub(crate) const SERVICES: &[&str] = &[
     "grid-planner",
     "sampling-planner",

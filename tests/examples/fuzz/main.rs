@@ -1,10 +1,11 @@
 //! Damaged files of every kind that people give to the product, made of valid ones, and what becomes of them:
 //! `cargo run --release -p tests --example fuzz -- --kind map-yaml --files 20000 --seed 1`.
 //!
-//! Readers may refuse a file; they may not panic, think for more than ten seconds of processor time, or take more than
-//! a gigabyte. A file that makes them is kept, and said. Files depend on nothing but kind, seed and number: `--first N
-//! --files 1` makes that of number N again. The kinds `graph`, `params` and `experiment` ask the binaries of a release
-//! build; all others are read in a process of their own, which is started again when a file ends it.
+//! Readers may refuse a file; they may not panic, think for more than ten seconds of processor time, or take
+//! more than a gigabyte. A file that makes them is kept, and said. Files depend on nothing but kind, seed and
+//! number: `--first N --files 1` makes that of number N again. The kinds `graph`, `params` and `experiment`
+//! ask the binaries of a release build; all others are read in a process of their own, which is started again
+//! when a file ends it.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::panic, reason = "a program for the workbench")]
 
 mod kinds;

@@ -124,7 +124,7 @@ impl Parser {
             self.advance();
         }
         let value = if let Token::Number(number) = *self.peek() {
-            // A sign may stand apart from its number; two signs are none.
+            // A sign may stand apart from its number; two signs are an error.
             (!has_sign || !number.is_sign_negative()).then(|| {
                 self.advance();
                 number

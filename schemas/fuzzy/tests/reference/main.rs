@@ -1,7 +1,8 @@
 //! The engine against tables that two other programs computed, fuzzylite 6 and jFuzzyLogic.
 //!
-//! Which case matches how closely, and why not more closely, is said beside it. fuzzylite integrates over a stated number
-//! of samples and compares with a tolerance of 1e-6: so does the engine here. Its tables give nine decimals, inputs too.
+//! Which case matches how closely, and why not more closely, is said beside it. fuzzylite integrates over a
+//! stated number of samples and compares with a tolerance of 1e-6: so does the engine here. Its tables give
+//! nine decimals, inputs too.
 
 #![expect(
     clippy::panic,
@@ -123,7 +124,8 @@ fn seven_by_seven_rules_of_fuzzylite_in_full_precision() {
     check_bench(1000);
 }
 
-/// jFuzzyLogic's tables of memberships: places and degrees times 100, rounded to whole numbers; so a half is the closest.
+/// jFuzzyLogic's tables of memberships: places and degrees times 100, rounded to whole numbers; so a half is
+/// the closest.
 #[track_caller]
 fn check_memberships(name: &str) {
     let (Some(text), Some(rows)) = (
@@ -155,7 +157,8 @@ fn jfuzzylogic_tables() {
     check_memberships("junit_gauss");
 }
 
-/// jFuzzyLogic's tip: inputs and output times 100; it samples the universe in 1000 steps of 0.03 from the lower end.
+/// jFuzzyLogic's tip: inputs and output times 100; it samples the universe in 1000 steps of 0.03 from the
+/// lower end.
 #[test]
 fn jfuzzylogic_tip() {
     let (Some(text), Some(rows)) = (
@@ -180,7 +183,8 @@ fn jfuzzylogic_robot_is_read_and_runs() {
     assert_eq!(fcl::read(&fcl::write(&system)).as_ref(), Ok(&system));
     let mut engine = Engine::new(&system, Options::default()).expect("the system compiles");
     assert_eq!(engine.rule_labels().len(), 41);
-    // Rule 29 alone: rd IS H, dq IS H, o IS Z, v IS L, all fully, weight 0.4529; la IS HA, symmetrical about 0.75.
+    // Rule 29 alone: rd IS H, dq IS H, o IS Z, v IS L, all fully, weight 0.4529; la IS HA, symmetrical about
+    // 0.75.
     let outputs = engine.step(&[2.0, 2.0, 0.0, 0.0]).to_vec();
     assert!((outputs[0] - 0.75).abs() < 1e-12, "{outputs:?}");
     let fired: Vec<f64> =

@@ -6,13 +6,15 @@ use super::Grid;
 const NONE: u32 = 1 << 29;
 
 impl<T> Grid<T> {
-    /// Distance in metres from each cell's middle to that of the nearest cell for which `is_target` holds: 0 in such a cell,
-    /// infinite where there is none at all. Exact, in time linear in the cells: distances within the columns, then in each
-    /// row the lower envelope of their parabolas (Felzenszwalb and Huttenlocher 2012).
+    /// Distance in metres from each cell's middle to that of the nearest cell for which `is_target` holds: 0
+    /// in such a cell, infinite where there is none at all. Exact, in time linear in the cells: distances
+    /// within the columns, then in each row the lower envelope of their parabolas (Felzenszwalb and
+    /// Huttenlocher 2012).
     pub fn distances_to_m(&self, is_target: impl Fn(&T) -> bool) -> Grid<f32> {
         let width = self.frame().width() as usize;
         let resolution_m = self.frame().resolution_m();
-        // Cells to the nearest target of the same column, swept up and down row by row: the inner loops run side by side.
+        // Cells to the nearest target of the same column, swept up and down row by row: the inner loops run
+        // side by side.
         let mut columns: Vec<u32> =
             self.as_slice().iter().map(|cell| if is_target(cell) { 0 } else { NONE }).collect();
         let sweep = |before: &[u32], row: &mut [u32]| {

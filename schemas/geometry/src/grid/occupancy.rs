@@ -76,8 +76,8 @@ impl std::fmt::Debug for Occupancy {
     }
 }
 
-/// The logarithm of the odds of a probability: 0 for 0.5, infinite for 0 and 1. Updates of independent measurements add up
-/// (Thrun et al. 2005, section 4.2).
+/// The logarithm of the odds of a probability: 0 for 0.5, infinite for 0 and 1. Updates of independent
+/// measurements add up (Thrun et al. 2005, section 4.2).
 pub fn log_odds(probability: f64) -> f64 {
     (probability / (1.0 - probability)).ln()
 }
@@ -109,15 +109,16 @@ impl OccupancyGrid {
         grown
     }
 
-    /// Whether a straight line between the middles of two cells touches no cell that is occupied with at least
-    /// `threshold_percent`, nor one outside of the grid; a line through a corner touches all cells around it.
+    /// Whether a straight line between the middles of two cells touches no cell that is occupied with at
+    /// least `threshold_percent`, nor one outside of the grid; a line through a corner touches all cells
+    /// around it.
     pub fn is_in_sight(&self, from: Cell, to: Cell, threshold_percent: u8) -> bool {
         let mut cells = self.frame().cells_between(from, to);
         cells.all(|cell| self.get(cell).is_some_and(|cell| !cell.is_occupied(threshold_percent)))
     }
 
-    /// How far a ray runs until it enters a cell that is occupied with at least `threshold_percent`, in metres; `None` if
-    /// it meets none within `max_range_m` or leaves the grid before.
+    /// How far a ray runs until it enters a cell that is occupied with at least `threshold_percent`, in
+    /// metres; `None` if it meets none within `max_range_m` or leaves the grid before.
     pub fn cast_m(
         &self,
         origin: Point2<f64>,

@@ -4,15 +4,16 @@ use super::{Cell, Grid, GridFrame};
 use nalgebra::{Point2, Vector2};
 
 impl GridFrame {
-    /// The cells that the segment from `from` to `to` passes, in their order, without those outside of the grid (Amanatides
-    /// and Woo 1987). A line exactly through a corner steps along x first. Empty when a coordinate is not finite.
+    /// The cells that the segment from `from` to `to` passes, in their order, without those outside of the
+    /// grid (Amanatides and Woo 1987). A line exactly through a corner steps along x first. Empty when a
+    /// coordinate is not finite.
     pub fn cells_along(&self, from: Point2<f64>, to: Point2<f64>) -> CellsAlong {
         CellsAlong::new(self, self.to_cells(from), self.to_cells(to))
     }
 
-    /// Every cell that the line between the middles of two cells touches, both ends included, in their order and exactly: a
-    /// line through a corner yields the two cells beside it as well. Ends may lie outside of the grid; so may what is
-    /// yielded then.
+    /// Every cell that the line between the middles of two cells touches, both ends included, in their order
+    /// and exactly: a line through a corner yields the two cells beside it as well. Ends may lie outside of
+    /// the grid; so may what is yielded then.
     pub fn cells_between(&self, from: Cell, to: Cell) -> CellsBetween {
         CellsBetween::new(from, to)
     }
@@ -98,7 +99,8 @@ impl CellsAlong {
         let (place, count) =
             if axis == 0 { (&mut self.column, self.width) } else { (&mut self.row, self.height) };
         *place += self.step[axis];
-        // A cell entered at the very end is touched in one point only, and the end's own cell when going forward.
+        // A cell entered at the very end is touched in one point only, and the end's own cell when going
+        // forward.
         self.done = self.entered > self.until
             || !(0..count).contains(place)
             || (self.entered >= self.until && self.step[axis] < 0);
@@ -115,8 +117,8 @@ impl Iterator for CellsAlong {
 }
 
 impl<T> Grid<T> {
-    /// How far a ray runs until it enters a cell that `stops` it, in metres: 0 if it begins in one; `None` if it meets none
-    /// within `max_range_m`, or when a number is not finite.
+    /// How far a ray runs until it enters a cell that `stops` it, in metres: 0 if it begins in one; `None` if
+    /// it meets none within `max_range_m`, or when a number is not finite.
     pub fn cast_until_m(
         &self,
         origin: Point2<f64>,
@@ -188,7 +190,8 @@ impl Iterator for CellsBetween {
         if self.left == [0, 0] {
             return None;
         }
-        // The line leaves the present cell at (2 k + 1) / (2 n) of the way along an axis of n cells after k of them.
+        // The line leaves the present cell at (2 k + 1) / (2 n) of the way along an axis of n cells after k
+        // of them.
         let [nx, ny] = self.way;
         let leave = |axis: usize| 2 * (self.way[axis] - self.left[axis]) + 1;
         let (x, y) = (leave(0) * ny, leave(1) * nx);

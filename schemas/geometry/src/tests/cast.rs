@@ -138,7 +138,8 @@ fn a_level_ray_passes_over_the_lower_shelf() {
     let mut scene = hallway();
     scene.add_body(Body::of(BodyKind::MailCart), Pose2::new(5.0, 0.25, 0.0), Surface::Furniture(0));
     let ray = |y, elevation_rad: f64| Ray::rising(Point2::new(4.0, y), 0.0, 0.25, elevation_rad);
-    // Between the bars: nothing within 4 m. At a bar: its front. Downwards by atan(0.03 / 0.55): the shelf's front.
+    // Between the bars: nothing within 4 m. At a bar: its front. Downwards by atan(0.03 / 0.55): the shelf's
+    // front.
     assert!(scene.cast_ray(&ray(0.25, 0.0), 4.0).is_none());
     sees(&scene, ray(0.02, 0.0), 0.55, Surface::Furniture(0));
     let down_rad = -(0.03_f64 / 0.55).atan();

@@ -119,7 +119,8 @@ proptest! {
         let mut found: Vec<_> = frame.cells_between(from, to).collect();
         prop_assert_eq!((found.first(), found.last()), (Some(&from), Some(&to)));
         found.sort();
-        // In whole numbers: the line from middle to middle touches the closed square of a cell when no axis separates them.
+        // In whole numbers: the line from middle to middle touches the closed square of a cell when no axis
+        // separates them.
         let (ax, ay) = (i64::from(2 * from.column) + 1, i64::from(2 * from.row) + 1);
         let (bx, by) = (i64::from(2 * to.column) + 1, i64::from(2 * to.row) + 1);
         let mut expected: Vec<_> = frame.cells().filter(|cell| {

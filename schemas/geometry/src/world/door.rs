@@ -76,8 +76,9 @@ pub struct DoorGeometry {
 }
 
 impl DoorGeometry {
-    /// Finds the wall that holds the opening and builds the lines. Those parts of the gap's position that are not exact in
-    /// the file (its distance from the wall, the direction into the room) are taken from the wall.
+    /// Finds the wall that holds the opening and builds the lines. Those parts of the gap's position that are
+    /// not exact in the file (its distance from the wall, the direction into the room) are taken from the
+    /// wall.
     pub(super) fn cut(floor: &Floor, opening: &Opening) -> Option<Self> {
         let wall = floor.segments().find(|wall| holds(wall, opening))?;
         let along = wall.direction()?;
@@ -110,11 +111,12 @@ impl DoorGeometry {
         })
     }
 
-    /// The solid leaf in its own frame, to be placed by [`DoorGeometry::leaf_pose`]: at its hinge, pointing along x.
+    /// The solid leaf in its own frame, to be placed by [`DoorGeometry::leaf_pose`]: at its hinge, pointing
+    /// along x.
     pub fn leaf_body(&self, height_m: f64) -> Body {
         let (width_m, thick_m) = (self.leaf.length_m(), LEAF_THICKNESS_M);
-        // The visible face lies on the x axis, the thickness behind it: to the left of a leaf hung on the left, for one who
-        // faces it from the hallway.
+        // The visible face lies on the x axis, the thickness behind it: to the left of a leaf hung on the
+        // left, for one who faces it from the hallway.
         let behind = match self.hinge {
             Hinge::Left => thick_m,
             Hinge::Right => -thick_m,
@@ -126,7 +128,8 @@ impl DoorGeometry {
         Body::new(prisms.ok())
     }
 
-    /// Where the leaf is when it is open by `fraction`: 0 closed, 1 at a right angle into the room (or slid away sideways).
+    /// Where the leaf is when it is open by `fraction`: 0 closed, 1 at a right angle into the room (or slid
+    /// away sideways).
     pub fn leaf_pose(&self, fraction: f64) -> Pose2 {
         let fraction = if fraction.is_nan() { 0.0 } else { fraction.clamp(0.0, 1.0) };
         let (hinge, tip, turn) = match self.hinge {

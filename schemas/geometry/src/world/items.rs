@@ -12,12 +12,12 @@ pub struct Floor {
     /// What people call it.
     #[serde(default)]
     pub name: String,
-    /// For an arena: the closed line around its free space, corners [x, y] in metres in either order of turning, a simple
-    /// polygon. Its edges are walls.
+    /// For an arena: the closed line around its free space, corners [x, y] in metres in either order of
+    /// turning, a simple polygon. Its edges are walls.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outline: Option<Vec<[f64; 2]>>,
-    /// Walls as polylines: lists of points [x, y] in metres, from floor to ceiling, without thickness. Walls run through
-    /// where doors are: the doors cut their own gaps.
+    /// Walls as polylines: lists of points [x, y] in metres, from floor to ceiling, without thickness. Walls
+    /// run through where doors are: the doors cut their own gaps.
     #[serde(default)]
     pub walls: Vec<Vec<[f64; 2]>>,
 }
@@ -35,7 +35,8 @@ impl Floor {
         pieces.filter(|piece| piece.a != piece.b)
     }
 
-    /// The arena's free space; `None` when the floor has no outline (or a broken one, which the check refuses).
+    /// The arena's free space; `None` when the floor has no outline (or a broken one, which the check
+    /// refuses).
     pub fn outline_polygon(&self) -> Option<Polygon> {
         Polygon::from_coordinates(self.outline.as_ref()?).ok()
     }
@@ -51,8 +52,8 @@ pub struct Door {
     pub floor: i32,
     /// Centre of the opening, on the line of a wall, [x, y] in metres.
     pub at: [f64; 2],
-    /// Which side of the wall the room lies on: any vector from hallway to room, such as [0, 1]. Its length and its angle to
-    /// the wall do not matter.
+    /// Which side of the wall the room lies on: any vector from hallway to room, such as [0, 1]. Its length
+    /// and its angle to the wall do not matter.
     pub into_room: [f64; 2],
     /// Width of the opening in metres.
     #[serde(default = "Door::default_width_m")]
@@ -72,7 +73,7 @@ pub struct Door {
     /// When somebody opens it (or closes it, if it stands open at the beginning); never without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moves: Option<Trigger>,
-    /// After so many seconds it goes back to what it was at the beginning; without, it stays.
+    /// After this many seconds it goes back to what it was at the beginning; without, it stays.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub returns_after_s: Option<f64>,
     /// How long the leaf needs from closed to open, in seconds.
@@ -106,7 +107,8 @@ pub enum Hinge {
     Right,
 }
 
-/// When something begins to move: once all that is given here has come true; at the very beginning if nothing is.
+/// When something begins to move: once all that is given here has come true; at the very beginning if nothing
+/// is.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Trigger {
@@ -213,10 +215,10 @@ pub struct Area {
     pub floor: i32,
     /// What it is marked for.
     pub kind: AreaKind,
-    /// Either this,
+    /// Its outline as a rectangle; an area has either this or `polygon`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rectangle: Option<Rectangle>,
-    /// or this: corners [x, y] in metres, a simple polygon.
+    /// Its outline as a simple polygon, corners [x, y] in metres; an area has either this or `rectangle`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub polygon: Option<Vec<[f64; 2]>>,
 }

@@ -5,8 +5,8 @@ use crate::{Pose2, Segment};
 use nalgebra::Point2;
 
 impl Trigger {
-    /// Whether it goes off: `now_s` seconds since the beginning, with the nearest robot `robot_distance_m` away (infinite
-    /// if there is none). It is for the caller to remember that it did.
+    /// Whether it goes off: `now_s` seconds since the beginning, with the nearest robot `robot_distance_m`
+    /// away (infinite if there is none). It is for the caller to remember that it did.
     pub fn goes_off(&self, now_s: f64, robot_distance_m: f64) -> bool {
         self.at_s.is_none_or(|at_s| now_s >= at_s)
             && self.near_m.is_none_or(|near_m| robot_distance_m < near_m)
@@ -14,8 +14,8 @@ impl Trigger {
 }
 
 impl Door {
-    /// How far the leaf is open, from 0 (closed) to 1, `since_trigger_s` seconds after [`Door::moves`] went off; `None`
-    /// before that.
+    /// How far the leaf is open, from 0 (closed) to 1, `since_trigger_s` seconds after [`Door::moves`] went
+    /// off; `None` before that.
     pub fn opening_fraction(&self, since_trigger_s: Option<f64>) -> f64 {
         let Some(since_s) = since_trigger_s else { return f64::from(u8::from(self.open)) };
         let turned = |seconds: f64| (seconds / self.swing_s).clamp(0.0, 1.0);
@@ -30,7 +30,8 @@ impl Door {
 }
 
 impl Walker {
-    /// Where the person is and faces, `since_start_s` seconds after setting out (0 before). Corners are turned at once.
+    /// Where the person is and faces, `since_start_s` seconds after setting out (0 before). Corners are
+    /// turned at once.
     pub fn pose(&self, since_start_s: f64) -> Pose2 {
         let point = |i: usize| Point2::new(self.path[i][0], self.path[i][1]);
         if self.path.len() < 2 {

@@ -15,7 +15,8 @@ pub struct WorldScene {
     pub bodies: WorldBodies,
 }
 
-/// The moving bodies of a floor: pairs of an index into the list of the [`World`], and the body in the [`Scene`].
+/// The moving bodies of a floor: pairs of an index into the list of the [`World`], and the body in the
+/// [`Scene`].
 #[derive(Debug, Clone, Default)]
 pub struct WorldBodies {
     /// Door leaves, by index into [`World::doors`]; move them to [`super::DoorGeometry::leaf_pose`].

@@ -1,7 +1,8 @@
 //! `#[derive(Message)]`: the run-time description of a message, from its declaration alone.
 //!
-//! The derive reads the field names, types and doc comments of a `#[repr(C)]` struct and implements `messages::Message` and
-//! `messages::Field` for it. A variable part is named with `#[message(element = Type)]`.
+//! The derive reads the field names, types and doc comments of a `#[repr(C)]` struct and implements
+//! `messages::Message` and `messages::Field` for it. A variable part is named with
+//! `#[message(element = Type)]`.
 
 use proc_macro::TokenStream;
 use quote::quote;

@@ -59,8 +59,9 @@ fn whatever_is_asked_the_curve_is_the_same_and_no_corner_too_fast() {
 }
 
 proptest! {
-    /// What the sensors beside the robot and in front of it do not see is met slowly: the corner that goes aside in a curve stands before it has
-    /// come 3 cm aside, as it goes no faster than the robot in all but the narrowest curves.
+    /// What the sensors beside the robot and in front of it do not see is met slowly: the corner that goes
+    /// aside in a curve stands before it has come 3 cm aside, as it goes no faster than the robot in all but
+    /// the narrowest curves.
     #[test]
     fn a_corner_comes_aside_by_no_more_than_it_may(left in 0.05..3.0_f64, right in 0.05..3.0_f64, reaction_s in 0.01..0.5_f64) {
         let (hull, track_m) = (Params::default().hull(), 0.4);

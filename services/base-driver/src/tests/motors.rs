@@ -51,8 +51,8 @@ fn only_gains_of_speed_are_limited() {
     gains(-0.1, -0.3, -0.112);
 }
 
-/// The first word after a pause in which the motors' watchdog has slowed the wheels, or stopped them: no faster than the motors have been
-/// left with and a step of gain; and so with every word from then on.
+/// The first word after a pause in which the motors' watchdog has slowed the wheels, or stopped them: no
+/// faster than the motors have been left with and a step of gain; and so with every word from then on.
 #[track_caller]
 fn check_pause(pause_ms: u64) {
     let mut robot = Robot::driving();

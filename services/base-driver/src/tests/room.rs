@@ -8,7 +8,8 @@ fn wall(from: (f64, f64), to: (f64, f64)) -> Vec<Point2<f64>> {
     line.points(0.04).collect()
 }
 
-/// Asks for the same for five seconds among things, from rest; returns the robot and the least room there was.
+/// Asks for the same for five seconds among things, from rest; returns the robot and the least room there
+/// was.
 fn ask(things: Vec<Point2<f64>>, mut robot: Robot, wished: (f64, f64)) -> (Robot, f64) {
     robot.things = things;
     let mut least_m = f64::INFINITY;
@@ -19,7 +20,8 @@ fn ask(things: Vec<Point2<f64>>, mut robot: Robot, wished: (f64, f64)) -> (Robot
     (robot, least_m)
 }
 
-/// A robot at rest at the origin that asks for something nearby: it stays off, and at rest in the end unless it is to get away.
+/// A robot at rest at the origin that asks for something nearby: it stays off, and at rest in the end unless
+/// it is to get away.
 #[track_caller]
 fn check_kept_off(things: Vec<Point2<f64>>, wished: (f64, f64)) {
     let (robot, least_m) = ask(things, Robot::new(Params::default()), wished);

@@ -94,7 +94,8 @@ fn too_near_to_be_measured_is_the_nearest_there_is() {
     check_scan(all(|_| true), Why::Violation, 7);
 }
 
-/// The reason, and what each face has to say when these directions cannot be read and everything else is 5 m away.
+/// The reason, and what each face has to say when these directions cannot be read and everything else is 5 m
+/// away.
 fn blind(where_to: impl Fn(i32) -> bool) -> (Why, [f32; 3]) {
     let said = scan_said(laser(|_| ()), &scan_of(|degrees| if where_to(degrees) { f32::NAN } else { 5.0 }));
     (said.reason.get().unwrap(), [said.front_m, said.right_m, said.left_m])
@@ -159,8 +160,9 @@ fn a_scan_that_does_not_cover_a_face_does_not_guard_it() {
 }
 
 proptest! {
-    /// A world of a few things as wide as a leg or wider, seen by a laser some of whose beams cannot be read: the guard never says that a face
-    /// is farther than the nearest of them, whichever beams it could not read.
+    /// A world of a few things as wide as a leg or wider, seen by a laser some of whose beams cannot be read:
+    /// the guard never says that a face is farther than the nearest of them, whichever beams it could not
+    /// read.
     #[test]
     fn no_face_is_said_to_be_farther_than_it_is(
         things in prop::collection::vec((-1.6..1.6_f64, 0.35..3.0_f64, 0.05..0.3_f64), 0..4),
@@ -187,7 +189,8 @@ proptest! {
         // What is seen of each face with all beams, finely.
         let full = scan_said(params.clone(), &scan_of(|degrees| range_m(degrees) as f32));
         for (name, said_m, true_m) in [("front", said.front_m, full.front_m), ("right", said.right_m, full.right_m), ("left", said.left_m, full.left_m)] {
-            // A disc is met by no beam but those that pass; its rim may lie beside the last of them, and its middle be 1.5 times a beam's width off.
+            // A disc is met by no beam but those that pass; its rim may lie beside the last of them, and its
+            // middle be 1.5 times a beam's width off.
             prop_assert!(said_m <= true_m + 0.12, "{name}: {said_m} m said, {true_m} m true");
         }
         let violated = full.violated_faces != 0;

@@ -74,7 +74,8 @@ fn what_was_seen_a_moment_ago_is_told_where_it_is_now() {
     assert!(points.is_empty(), "{points:?}");
 }
 
-/// Whether what lay beside the nose is still told beside the tail, where no sensor looks, after so many frames there.
+/// Whether what lay beside the nose is still told beside the tail, where no sensor looks, after so many
+/// frames there.
 #[track_caller]
 fn check_remembered(frames: usize, at: impl Fn(usize) -> Pose2, is_there: bool) {
     let seen = frame([FAR, 0.12, FAR, FAR, FAR, FAR, FAR, FAR]);
@@ -97,7 +98,8 @@ fn what_was_seen_is_remembered_for_longer_while_the_robot_stands() {
     check_remembered(700, goes_to_and_fro, false);
 }
 
-/// What the sensors of a robot at `pose` see of a long wall along the line y = `wall_y_m`, in the middle of their cones.
+/// What the sensors of a robot at `pose` see of a long wall along the line y = `wall_y_m`, in the middle of
+/// their cones.
 fn beside(wall_y_m: f64, pose: Pose2) -> TofRanges {
     frame(TofRanges::MOUNTS.map(|mount| {
         let eye = pose.compose(mount);

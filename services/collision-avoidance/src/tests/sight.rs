@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// The last word of a guard that has driven for ten seconds, a step of so many metres a frame, with these frames.
+/// The last word of a guard that has driven for ten seconds, a step of so many metres a frame, with these
+/// frames.
 #[track_caller]
 fn check_seen(step_m: f64, ranges: impl Fn(u32) -> TofRanges, expected: Why) {
     let mut bench = Bench::new(Params::default());
@@ -120,7 +121,8 @@ fn without_odometry_nobody_knows_that_a_sensor_is_blind() {
 }
 
 proptest! {
-    /// Random walls around, random statuses for some sensors: a face is never said to be farther than the nearest distance that a sensor of it tells.
+    /// Random walls around, random statuses for some sensors: a face is never said to be farther than the
+    /// nearest distance that a sensor of it tells.
     #[test]
     fn no_face_is_said_to_be_farther_than_it_is(
         frames in prop::collection::vec((prop::array::uniform8(0.06_f32..1.5), prop::array::uniform8(prop_oneof![6 => Just(0_u32), 4 => 0_u32..14])), 1..30)

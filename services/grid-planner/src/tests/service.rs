@@ -99,7 +99,8 @@ fn a_robot_that_strays_gets_a_new_path() {
     assert_eq!((path.revision, waypoints[0].x_m), (2, 5.0));
 }
 
-/// Drives along the lane at 0.3 m/s towards a box whose near face is at `face_m`, seen by the two right front sensors; counts the paths.
+/// Drives along the lane at 0.3 m/s towards a box whose near face is at `face_m`, seen by the two right front
+/// sensors; counts the paths.
 fn drive_towards_box(
     planner: &mut GridPlanner,
     face_m: f64,
@@ -177,7 +178,8 @@ fn one_reading_is_not_yet_an_obstacle_and_passing_readings_free_it() {
 #[test]
 fn a_box_beside_the_lane_stays_known_when_no_sensor_looks_there_any_more() {
     let mut planner = planner();
-    // Its corner lies 0.26 m beside the path: in the outermost cone from afar, beside all of them from near by.
+    // Its corner lies 0.26 m beside the path: in the outermost cone from afar, beside all of them from near
+    // by.
     for tenths in 0..30 {
         let x_m = 2.0 + 0.036 * tenths as f64;
         let seen = if x_m < 2.25 { ranges(&[(2, 0.9 - (x_m - 2.0) as f32)]) } else { ranges(&[]) };

@@ -3,7 +3,7 @@
 use crate::log::{Fault, Log, Remark, Times};
 use crate::params::Timing;
 
-/// The two time stamps of a line, in seconds; NaN for one that is none.
+/// The two time stamps of a line, in seconds; NaN for an invalid one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stamps {
     /// When the logger wrote the line.
@@ -17,9 +17,9 @@ const KINDS: usize = 3;
 
 /// Steps below this are steps of a drive; longer ones are told.
 const LONGEST_STEP_S: f64 = 60.0;
-/// A longer silence is none: the clock was set.
+/// A longer silence means that the clock was set.
 const LONGEST_PAUSE_S: f64 = 86_400.0;
-/// Stamps up to here are none, unless the log begins with them.
+/// Stamps up to this are invalid, unless the log begins with them.
 const NONE_S: f64 = 1e-6;
 /// Lines may be written in another order than they were made, by so much.
 const DISORDER_S: f64 = 1.0;
@@ -99,8 +99,9 @@ impl Use {
     }
 }
 
-/// Whether a stamp is none: programs that put lines into a log afterwards, as those that correct its poses do, stamp them with zero, or with
-/// what memory held, which as a number is next to it. A log may begin at zero.
+/// Whether a stamp is missing: programs that put lines into a log afterwards, as those that correct its poses
+/// do, stamp them with zero, or with what memory held, which as a number is next to it. A log may begin at
+/// zero.
 fn is_missing(stamp: f64, begun: &mut bool) -> bool {
     *begun |= stamp > NONE_S;
     *begun && stamp.abs() <= NONE_S

@@ -1,5 +1,5 @@
-//! Odometry of logs whose poses were corrected later: after each scan it begins anew at the scan's corrected pose, so that only the ways
-//! between two scans are what the robot's wheels said.
+//! Odometry of logs whose poses were corrected later: after each scan it begins anew at the scan's corrected
+//! pose, so that only the ways between two scans are what the robot's wheels said.
 
 use super::{Moment, lines::Line};
 use crate::log::{Log, Remark};

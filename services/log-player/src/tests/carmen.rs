@@ -460,7 +460,8 @@ fn odometry(log: &Log) -> Vec<f64> {
     ways.collect()
 }
 
-/// Two metres driven, of which the wheels counted 0.8 m between one scan and the next, and the corrections put 0.2 m beside them.
+/// Two metres driven, of which the wheels counted 0.8 m between one scan and the next, and the corrections
+/// put 0.2 m beside them.
 fn corrected() -> String {
     let mut text = odom(0.0, 1.0) + &odom(0.4, 2.0);
     for scan in 1..=5_u32 {

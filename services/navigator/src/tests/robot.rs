@@ -1,4 +1,5 @@
-//! A tiny robot in a tiny building: ideal motion with limited acceleration, sightings of doors, a planner of straight lines, a car.
+//! A tiny robot in a tiny building: ideal motion with limited acceleration, sightings of doors, a planner of
+//! straight lines, a car.
 
 use crate::{Building, Inputs, Lift, Navigator, Outputs, Params, Room, Snapshot, Spot};
 use geometry::{Pose2, angle};

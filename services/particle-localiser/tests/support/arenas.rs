@@ -1,4 +1,5 @@
-//! The ultrasonic robot in an arena: it starts anywhere without a pose, looks around, and moves towards open space until it knows where it is.
+//! The ultrasonic robot in an arena: it starts anywhere without a pose, looks around, and moves towards open
+//! space until it knows where it is.
 #![allow(
     dead_code,
     missing_docs,

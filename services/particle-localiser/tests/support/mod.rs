@@ -1,4 +1,5 @@
-//! Recorded drives for the tests: minimal readers of the logs, a map of the even scans, and a robot that drives along a recording.
+//! Recorded drives for the tests: minimal readers of the logs, a map of the even scans, and a robot that
+//! drives along a recording.
 #![allow(
     dead_code,
     missing_docs,
@@ -52,7 +53,8 @@ fn unpacked(file: &Path) -> String {
     text
 }
 
-/// A CARMEN log: its even scans, from 0 on, make the map at their corrected poses; its odd ones are to be localised.
+/// A CARMEN log: its even scans, from 0 on, make the map at their corrected poses; its odd ones are to be
+/// localised.
 pub fn load(name: &str) -> Option<Drive> {
     let looks = read_carmen(&unpacked(&shared(&format!("laser_carmen/{name}-corrected.log.gz"))?));
     let grid = map_of(looks.iter().step_by(2));
@@ -68,7 +70,8 @@ pub fn load(name: &str) -> Option<Drive> {
     Some(Drive { looks: odd, grid, map })
 }
 
-/// The drive in Málaga on the map that came with it, put into the frame of the true poses (see the README beside it).
+/// The drive in Málaga on the map that came with it, put into the frame of the true poses (see the README
+/// beside it).
 pub fn malaga() -> Drive {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../launch/graphs/data/malaga");
     let truth = std::fs::read_to_string(folder.join("truth.txt")).unwrap();
@@ -78,8 +81,8 @@ pub fn malaga() -> Drive {
     Drive { looks, grid, map }
 }
 
-/// The odometry of these logs was corrected too: after a scan it goes on from the scan's corrected pose. Only the steps between two scans
-/// are the robot's own, and are put one to the other's end.
+/// The odometry of these logs was corrected too: after a scan it goes on from the scan's corrected pose. Only
+/// the steps between two scans are the robot's own, and are put one to the other's end.
 fn read_carmen(text: &str) -> Vec<Look> {
     let (mut looks, mut way) = (Vec::new(), Vec::new());
     let (mut recorded, mut odometry) = (None::<Pose2>, Pose2::IDENTITY);
@@ -314,7 +317,8 @@ impl Dice {
     }
 }
 
-/// Follows a drive from a known pose for 10 m, is carried elsewhere, at least 3 m away, and drives on there for `most_m`.
+/// Follows a drive from a known pose for 10 m, is carried elsewhere, at least 3 m away, and drives on there
+/// for `most_m`.
 pub fn kidnap(drive: &Drive, params: Params, seed: u64, most_m: f64) -> Run {
     let mut dice = Dice(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) + 1);
     let looks = &drive.looks;
@@ -352,7 +356,8 @@ pub fn follow(drive: &Drive, seeds: u64, most_m: f64) -> Followed {
     worst
 }
 
-/// Of so many starts without a pose, spread over the drive, how many were right at the end of 10 m of travel, and knew.
+/// Of so many starts without a pose, spread over the drive, how many were right at the end of 10 m of travel,
+/// and knew.
 pub fn found(drive: &Drive, starts: usize) -> usize {
     let is_right = |start: &usize| {
         let looks = &drive.looks[start * (drive.looks.len() * 9 / 10) / starts..];

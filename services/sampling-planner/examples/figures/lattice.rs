@@ -4,8 +4,8 @@ use geometry::{Point2, Segment};
 use pathfinding::prelude::astar;
 use sampling_planner::View;
 
-/// The shortest path over the eight neighbours of each star, from the start to the star at the goal, with every star on its way; `None`
-/// when there is none.
+/// The shortest path over the eight neighbours of each star, from the start to the star at the goal, with
+/// every star on its way; `None` when there is none.
 pub(crate) fn path(
     view: &View<'_>,
     start: Point2<f64>,

@@ -58,8 +58,8 @@ fn the_arenas_have_their_shortest_paths() {
     check_shortest("default", [0.50, 0.10], [0.90, 0.90], 104.0);
 }
 
-/// Draws 150 times 30 samples at an offset of 8 cm: how often so many waypoints are chosen (none first), how often there is no path,
-/// and the median length of the paths in centimetres.
+/// Draws 150 times 30 samples at an offset of 8 cm: how often so many waypoints are chosen (none first), how
+/// often there is no path, and the median length of the paths in centimetres.
 fn draws(name: &str, start: [f64; 2], goal: [f64; 2]) -> ([usize; 6], usize, f64) {
     let space = space(name, 0.08);
     let view = View::new(&space, &[], 0.0);

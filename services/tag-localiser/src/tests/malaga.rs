@@ -1,4 +1,5 @@
-//! The recorded drive in Malaga: 343 steps, three ultra-wideband beacons, one of which is wrong almost half of the time.
+//! The recorded drive in Malaga: 343 steps, three ultra-wideband beacons, one of which is wrong almost half
+//! of the time.
 
 use super::robot::{median, quantile};
 use crate::*;

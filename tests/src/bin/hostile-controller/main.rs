@@ -1,5 +1,5 @@
-//! A controller that means ill, for tests only: it drives decently for a while if wanted, and then asks for the worst, or breaks down in
-//! one of the ways in which programs break down.
+//! A controller that means ill, for tests only: it drives decently for a while if wanted, and then asks for
+//! the worst, or breaks down in one of the ways in which programs break down.
 //! `launch up coffee --lockstep --swap controller=hostile-controller --set 'controller.mode="max"'`
 
 #![allow(clippy::panic, reason = "that is what it is for")]

@@ -29,7 +29,7 @@ pub(crate) enum Mode {
     Zigzag,
     /// As `Zigzag`, mostly ahead, so that it gets somewhere.
     Wander,
-    /// Numbers that are none.
+    /// Invalid numbers.
     Nan,
     /// Infinite numbers.
     Infinite,
